@@ -1,0 +1,1 @@
+"""Procedural characters and gestures: everything `make_samples.py` needs."""
