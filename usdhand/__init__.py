@@ -1,0 +1,46 @@
+"""Hands for digital characters: reduce, fill, splice and convert finger motion over OpenUSD.
+
+The functions are the verbs of the command line, on values: see `usdhand.api`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from usdhand.api import (
+        apply_rig,
+        check_file,
+        compare,
+        expand,
+        find_hands,
+        read_clip,
+        read_rig,
+        reduce_hands,
+        write_clip,
+        write_rig,
+    )
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "apply_rig",
+    "check_file",
+    "compare",
+    "expand",
+    "find_hands",
+    "read_clip",
+    "read_rig",
+    "reduce_hands",
+    "write_clip",
+    "write_rig",
+]
+
+
+def __getattr__(name: str) -> Any:
+    # numpy and pxr take a quarter of a second to import: only when a verb is used.
+    if name in __all__:
+        from usdhand import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module 'usdhand' has no attribute '{name}'")

@@ -1,0 +1,5 @@
+"""``python -m usdhand``."""
+
+from usdhand.cli import main
+
+main()

@@ -1,0 +1,189 @@
+"""What carries the hands: joints' places, arms, spine and legs, by hierarchy and bind pose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from usdhand.motion.rotations import Array
+from usdhand.motion.skeleton import Skeleton
+
+Chain = tuple[int, ...]
+
+
+def unit(v: Array) -> Array:
+    """Vector (3,) scaled to length 1; a zero vector stays zero."""
+    return np.asarray(v / max(float(np.linalg.norm(v)), 1e-12))
+
+
+def joint_points(skeleton: Skeleton) -> Array:
+    """World positions (joints, 3) at the bind pose, with misplaced joints put back, cm.
+
+    Exporters leave joints that move no skin in one place, mostly the origin, at the end of absurdly
+    long bones. They go where the rest pose puts them, or if that is as wrong, a bone is continued.
+    """
+    world, parents = np.nan_to_num(skeleton.bind), skeleton.parents
+    if not np.ptp(world[:, :3, 3], axis=0).any():
+        return _rest_points(skeleton)
+    misplaced = _misplaced(skeleton)
+    for joint in skeleton.order:
+        if joint not in misplaced:
+            continue
+        parent = int(parents[joint])
+        offset = skeleton.rest[joint]
+        if np.linalg.norm(offset[:3, 3]) > _bone(skeleton, joint) / _ABSURD:
+            bone = world[parent, :3, 3] - world[max(parents[parent], 0), :3, 3]
+            world[joint, :3, 3] = world[parent, :3, 3] + 0.7 * bone
+        else:
+            world[joint] = world[parent] @ offset
+    return np.asarray(world[:, :3, 3])
+
+
+_ABSURD = 3.0  # times as long as the bone before it
+
+
+def _bone(skeleton: Skeleton, joint: int) -> float:
+    places, parent = skeleton.bind_positions, skeleton.parents[joint]
+    return float(np.linalg.norm(places[joint] - places[parent])) if parent >= 0 else 0.0
+
+
+def _misplaced(skeleton: Skeleton) -> set[int]:
+    """Joints in one place with another branch's joint and much too far from their parent."""
+    at: dict[bytes, list[int]] = {}
+    for joint, place in enumerate(np.round(skeleton.bind_positions, 4) + 0.0):
+        at.setdefault(place.tobytes(), []).append(joint)
+    return {
+        joint
+        for joints in at.values()
+        if len({int(skeleton.parents[j]) for j in joints}) > 1
+        for joint in joints
+        if skeleton.parents[joint] >= 0
+        and _bone(skeleton, joint) > _ABSURD * _bone(skeleton, int(skeleton.parents[joint]))
+    }
+
+
+def _rest_points(skeleton: Skeleton) -> Array:
+    world = np.nan_to_num(skeleton.rest)
+    for joint in skeleton.order:
+        if (parent := skeleton.parents[joint]) >= 0:
+            world[joint] = world[parent] @ world[joint]
+    return np.asarray(world[:, :3, 3])
+
+
+def common_ancestor(skeleton: Skeleton, joints: Iterable[int]) -> int | None:
+    """Lowest joint above all ``joints`` (one of them may be it), None if they share none."""
+    lines = [(j, *skeleton.ancestors(j)) for j in joints]
+    shared = set(lines[0]).intersection(*lines[1:])
+    return next((j for j in lines[0] if j in shared), None)
+
+
+def arm_joints(skeleton: Skeleton, points: Array, wrist: int, chest: int | None) -> dict[str, int]:
+    """Clavicle, shoulder and elbow between the chest and a wrist, as far as there are joints.
+
+    Twist joints may divide the arm: of three joints or more the first is the clavicle, and the
+    shoulder and elbow are the two that make the shorter of upper arm and forearm longest.
+    """
+    line = skeleton.ancestors(wrist)
+    if chest is None or chest not in line:
+        return {}
+    arm = line[: line.index(chest)][::-1]
+    if not arm:
+        return {}
+    if len(arm) == 1:
+        return {"elbow": arm[0]}
+
+    def length(a: int, b: int) -> float:
+        return float(np.linalg.norm(points[a] - points[b]))
+
+    def shorter(pair: tuple[int, int]) -> float:
+        return min(length(*pair), length(pair[1], wrist))
+
+    pairs = combinations(arm if len(arm) == 2 else arm[1:], 2)
+    shoulder, elbow = max(pairs, key=shorter)
+    found = {"shoulder": shoulder, "elbow": elbow}
+    if arm[0] != shoulder:
+        found["clavicle"] = arm[0]
+    return found
+
+
+@dataclass(frozen=True)
+class Body:
+    """What carries the hands: joints where found, and directions (3,) of the bind pose."""
+
+    joints: Mapping[str, int]
+    up: Array
+    facing: Array | None
+
+
+def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
+    """Find chest, hips, neck and head from the wrists, and which way the character looks.
+
+    The chest is where both arms meet, the hips the spine joint nearest to where the legs start.
+    Up runs from the feet to the chest (Y without legs); the toes say what is in front.
+    """
+    up = np.array([0.0, 1.0, 0.0])
+    chest = common_ancestor(skeleton, wrists) if len(wrists) > 1 else None
+    if chest is None or chest in wrists:
+        return Body({}, up, None)
+    heights = heights_of(skeleton)
+    spine = (chest, *skeleton.ancestors(chest))
+    joints, facing = {"chest": chest}, None
+    legs = _legs(skeleton, points, spine, heights)
+    if legs:
+        tops = np.mean([points[leg[0]] for leg in legs], axis=0)
+        joints["hips"] = min(spine[1:], key=lambda j: float(np.linalg.norm(points[j] - tops)))
+        up = unit(tops - np.mean([points[leg[-1]] for leg in legs], axis=0))
+        facing = _toe_direction(points, legs, up)
+    arms = {a for w in wrists for a in (w, *skeleton.ancestors(w))}
+    above = [c for c in skeleton.children[chest] if c not in arms and heights[c] > 0]
+    above = above or [c for c in skeleton.children[chest] if c not in arms]
+    if above:
+        neck = max(above, key=lambda c: float(points[c] @ up))
+        joints["neck"] = neck
+        if skeleton.children[neck]:
+            joints["head"] = max(skeleton.children[neck], key=lambda c: (heights[c], -c))
+    return Body(joints, up, facing)
+
+
+def _legs(
+    skeleton: Skeleton, points: Array, spine: Chain, heights: Sequence[int]
+) -> tuple[Chain, Chain] | None:
+    """Return the two long branches off the spine that end farthest from the chest."""
+    for below, joint in pairwise(spine):
+        branches = [c for c in skeleton.children[joint] if c != below and heights[c] >= 2]
+        lines = [_deepest_line(skeleton, c, heights) for c in branches]
+        lines.sort(key=lambda line: -float(np.linalg.norm(points[line[-1]] - points[spine[0]])))
+        if len(lines) >= 2:
+            return lines[0], lines[1]
+    return None
+
+
+def _toe_direction(points: Array, legs: Iterable[Chain], up: Array) -> Array | None:
+    """Sum of the legs' level bones (feet, toes), None if there are none."""
+    total = np.zeros(3)
+    for leg in legs:
+        for bone in np.diff(points[list(leg)], axis=0):
+            level = bone - up * (bone @ up)
+            if np.linalg.norm(level) > abs(bone @ up):
+                total += level
+    return unit(total) if np.linalg.norm(total) > 1e-6 else None
+
+
+def heights_of(skeleton: Skeleton) -> list[int]:
+    """Return the number of bones from each joint down to its deepest leaf."""
+    heights = [0] * len(skeleton)
+    for joint in reversed(skeleton.order):
+        parent = int(skeleton.parents[joint])
+        if parent >= 0:
+            heights[parent] = max(heights[parent], heights[joint] + 1)
+    return heights
+
+
+def _deepest_line(skeleton: Skeleton, joint: int, heights: Sequence[int]) -> Chain:
+    line = [joint]
+    while skeleton.children[line[-1]]:
+        line.append(max(skeleton.children[line[-1]], key=lambda c: (heights[c], -c)))
+    return tuple(line)

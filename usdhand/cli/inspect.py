@@ -1,0 +1,140 @@
+"""usdhand inspect."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from usdhand.cli.common import (
+    files_argument,
+    find_files,
+    json_option,
+    map_option,
+    quiet_option,
+    say,
+    skel_option,
+    table,
+    verbose_option,
+    warn,
+)
+
+if TYPE_CHECKING:
+    from usdhand.anatomy import Conventions
+
+
+@click.command("inspect")
+@files_argument()
+@skel_option
+@map_option
+@json_option
+@quiet_option
+@verbose_option
+def command(
+    files: tuple[str, ...],
+    skel: str | None,
+    maps: tuple[Path, ...],
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    r"""Show skeletons, timing, units, hands and problems of files.
+
+    \b
+    Example:
+      usdhand inspect samples/characters samples/gestures/ok_01.usdc
+    """
+    from usdhand import api
+    from usdhand.errors import UsdHandError
+    from usdhand.report.document import document, dumps
+
+    paths = find_files(files)
+    conventions = api.conventions_from(maps)
+    results, code = [], 0
+    for path in paths:
+        result: dict[str, Any] = {"path": str(path)}
+        try:
+            result |= _inspect(path, skel, conventions)
+        except UsdHandError as error:
+            result["error"] = str(error)
+            code = max(code, error.exit_code)
+            warn(str(error), as_json)
+        else:
+            if "hand_error" in result:
+                code = max(code, 4)
+            if not as_json:
+                say(_text(result, verbose), quiet)
+        results.append(result)
+    if as_json:
+        click.echo(dumps(document("inspect", [*paths, *maps], {"skel": skel}, {"files": results})))
+    click.get_current_context().exit(code)
+
+
+def _inspect(path: Path, skel: str | None, conventions: Conventions | None) -> dict[str, Any]:
+    from usdhand.api import find_hands
+    from usdhand.errors import HandNotFoundError
+    from usdhand.formats.usd.read import bind_pose_clip, clip_from_character
+    from usdhand.formats.usd.stage import find_character
+    from usdhand.report.results import inspect_result
+
+    character = find_character(path, skel)
+    animated = character.animation is not None
+    clip = clip_from_character(character) if animated else bind_pose_clip(character)
+    try:
+        return inspect_result(clip, find_hands(clip, conventions), animated)
+    except HandNotFoundError as error:
+        return inspect_result(clip, None, animated) | {"hand_error": str(error)}
+
+
+def _text(result: dict[str, Any], verbose: bool) -> str:
+    lines = [
+        f"{result['path']}",
+        f"  skeleton {result['skeleton']}, {result['joints']} joints, "
+        f"{result['cm_per_unit']:g} cm a unit, {result['up_axis']} up",
+    ]
+    if result["animation"]:
+        lines.append(
+            f"  motion {result['animation']}, {result['frames']} frames at {result['fps']:g} fps, "
+            f"{result['start_s']:.3f} to {result['end_s']:.3f} s"
+        )
+    else:
+        lines.append("  no motion")
+    if "hand_error" in result:
+        lines.append(f"  no hands: {result['hand_error']}")
+    else:
+        lines += _hand_lines(result, verbose)
+    lines += [f"  note: {note}" for note in result.get("notes", ())]
+    lines += [
+        f"  problem: {p['message']}" + (f" ({p['where']})" if p["where"] else "")
+        for p in result["problems"]
+    ]
+    return "\n".join(lines)
+
+
+def _hand_lines(result: dict[str, Any], verbose: bool) -> list[str]:
+    lines = [f"  hands by convention '{result['convention']}'"]
+    for side, hand in result["hands"].items():
+        missing = f", without {', '.join(hand['missing'])}" if hand["missing"] else ""
+        lines.append(
+            f"    {side}: {len(hand['joints'])} joints{missing}, wrist {_leaf(hand['wrist'])}, "
+            f"elbow {_leaf(hand['elbow'])}, shoulder {_leaf(hand['shoulder'])}"
+        )
+    body = ", ".join(f"{k} {_leaf(result[k])}" for k in ("hips", "chest", "neck", "head"))
+    lines.append(f"    body: {body}")
+    channels = result.get("channels", [])
+    shown = [c for c in channels if verbose or c["flexion"]]
+    if shown:
+        head = ["channel" if verbose else "flexion", "min deg", "max deg", "mean deg"]
+        numbers = [
+            [c["name"], *(f"{c[k]:.1f}" for k in ("min_deg", "max_deg", "mean_deg"))] for c in shown
+        ]
+        lines += ["    " + line for line in table([head, *numbers], right=(1, 2, 3)).splitlines()]
+    if verbose:
+        for side, hand in result["hands"].items():
+            lines += [f"    {side} {name}: {path}" for name, path in hand["joints"].items()]
+    return lines
+
+
+def _leaf(joint: str | None) -> str:
+    return "not found" if joint is None else joint.rsplit("/", 1)[-1]

@@ -1,0 +1,177 @@
+"""Two motions compared: joints, channels, fingertips, smoothness and timing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from usdhand.anatomy.channels import Hands
+from usdhand.errors import UsageError
+from usdhand.motion import Clip, leaf_name
+from usdhand.motion import rotations as rot
+from usdhand.motion.resample import interpolate, interpolate_rotations
+from usdhand.motion.rotations import Array
+
+LONGEST_LAG_S = 2.0
+# Hands that move less than this tell nothing about timing.
+STILL_DEG = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How motion B differs from motion A, over the time that both last.
+
+    Attributes
+    ----------
+    joints : joints with the same name in both; ``joint_rms``, ``joint_max`` their angle, degrees
+    channels : hand channels in both; ``channel_rms``, ``channel_max`` their difference, degrees
+    fingertip_mean, fingertip_max : mm, relative to the wrist, in the axes of the palm
+    jerk : RMS third derivative of the channels of A and of B, degrees / s^3
+    lag : seconds by which B's hands are late (None where they hardly move)
+    frames : compared, at A's frame rate
+    """
+
+    joints: tuple[str, ...]
+    joint_rms: Array
+    joint_max: Array
+    channels: tuple[str, ...]
+    channel_rms: Array
+    channel_max: Array
+    fingertip_mean: float
+    fingertip_max: float
+    jerk: tuple[float, float]
+    lag: float | None
+    frames: int
+
+    @property
+    def rms_deg(self) -> float:
+        """RMS over the compared channels, degrees."""
+        return float(np.sqrt(np.mean(self.channel_rms**2)))
+
+    @property
+    def max_deg(self) -> float:
+        """Largest difference of a channel, degrees."""
+        return float(self.channel_max.max())
+
+
+def compare_clips(
+    a: Clip, b: Clip, hands_a: Hands, hands_b: Hands, align: bool = False
+) -> Comparison:
+    """Compare B with A, both from their first frame on.
+
+    Parameters
+    ----------
+    align : shift B by the lag that was found before comparing
+
+    Raises
+    ------
+    UsageError
+        if the clips have no hand channel in common.
+    """
+    channels_a, channels_b = hands_a.encode(a), hands_b.encode(b)
+    names = tuple(n for n in channels_a.names if n in set(channels_b.names))
+    if not names:
+        raise UsageError(f"{a.name} and {b.name} have no hand joint in common.")
+    curves_a = channels_a.select(names).values
+    curves_b = channels_b.select(names).values
+    lag = find_lag(curves_a, _at_rate(curves_b, b.fps, a.fps), a.fps)
+    shift = (lag or 0.0) if align else 0.0
+    first, count = _overlap(a, b, shift)
+    at_b = (np.arange(first, first + count) / a.fps + shift) * b.fps
+    span = slice(first, first + count)
+
+    difference = interpolate(curves_b, at_b) - curves_a[span]
+    difference = (difference + 180.0) % 360.0 - 180.0
+    joints, angles = _joint_angles(a, b, span, at_b)
+    tips_a, tips_b = _common_tips(a, b, hands_a, hands_b)
+    distance = 10.0 * np.linalg.norm(interpolate(tips_b, at_b) - tips_a[span], axis=-1)
+    return Comparison(
+        joints,
+        np.sqrt(np.mean(angles**2, axis=0)),
+        angles.max(axis=0, initial=0.0),
+        names,
+        np.sqrt(np.mean(difference**2, axis=0)),
+        np.abs(difference).max(axis=0),
+        float(distance.mean()),
+        float(distance.max()),
+        (rms_jerk(curves_a, a.fps), rms_jerk(curves_b, b.fps)),
+        lag,
+        count,
+    )
+
+
+def find_lag(a: Array, b: Array, fps: float) -> float | None:
+    """Seconds by which curves B (frames, n) are late, the shift with the least RMS difference.
+
+    Constant offsets do not matter. Refined below a frame by a parabola through the best three.
+    """
+    if min(len(a), len(b)) < 8 or max(np.ptp(a, axis=0).max(), np.ptp(b, axis=0).max()) < STILL_DEG:
+        return None
+    most = min(int(LONGEST_LAG_S * fps), min(len(a), len(b)) // 2)
+    shifts = range(-most, most + 1)
+
+    def cost(shift: int) -> float:
+        start, end = max(0, -shift), min(len(a), len(b) - shift)
+        d = b[start + shift : end + shift] - a[start:end]
+        return float(np.mean(d.var(axis=0)))
+
+    costs = np.array([cost(s) for s in shifts])
+    best = int(np.argmin(costs))
+    fraction = 0.0
+    if 0 < best < len(costs) - 1:
+        low, mid, high = costs[best - 1 : best + 2]
+        bend = low - 2 * mid + high
+        fraction = 0.5 * (low - high) / bend if bend > 0 else 0.0
+    return float((shifts[best] + fraction) / fps)
+
+
+def rms_jerk(curves: Array, fps: float) -> float:
+    """RMS third derivative of curves (frames, n), in their unit / s^3; 0 for under 4 frames."""
+    if len(curves) < 4:
+        return 0.0
+    return float(np.sqrt(np.mean((np.diff(curves, n=3, axis=0) * fps**3) ** 2)))
+
+
+def _overlap(a: Clip, b: Clip, shift: float) -> tuple[int, int]:
+    """First frame of A and number of frames for which B, late by ``shift`` s, has motion."""
+    first = max(0, int(np.ceil(-shift * a.fps - 1e-6)))
+    last = min(len(a) - 1, int(np.floor((b.duration - shift) * a.fps + 1e-6)))
+    if last < first:
+        raise UsageError(f"{a.name} and {b.name} do not overlap in time.")
+    return first, last - first + 1
+
+
+def _at_rate(curves: Array, fps: float, wanted: float) -> Array:
+    if abs(fps - wanted) < 1e-6:
+        return curves
+    count = int(np.floor((len(curves) - 1) * wanted / fps + 1e-6)) + 1
+    return interpolate(curves, np.arange(count) * fps / wanted)
+
+
+def _joint_angles(a: Clip, b: Clip, span: slice, at_b: Array) -> tuple[tuple[str, ...], Array]:
+    """Angle (frames, n) between local rotations of joints with the same, unique name."""
+    names = [n for n in _unique(a.skeleton.names) if n in set(_unique(b.skeleton.names))]
+    in_a = [a.skeleton.names.index(n) for n in names]
+    in_b = [b.skeleton.names.index(n) for n in names]
+    if not names:
+        return (), np.empty((len(at_b), 0))
+    other = interpolate_rotations(b.rotations[:, in_b], at_b)
+    return tuple(names), rot.angle_between(a.rotations[span, in_a], other)
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    leaves = [leaf_name(n) for n in names]
+    return [n for n in leaves if leaves.count(n) == 1]
+
+
+def _common_tips(a: Clip, b: Clip, hands_a: Hands, hands_b: Hands) -> tuple[Array, Array]:
+    sides = [s for s in hands_a.frames if s in hands_b.frames]
+
+    def tips(clip: Clip, hands: Hands, others: Hands) -> Array:
+        only = replace(hands, frames={s: hands.frames[s] for s in sides})
+        keep = [digit in others.frames[s].digits for s in sides for digit in hands.frames[s].digits]
+        return only.fingertips(clip)[:, keep]
+
+    return tips(a, hands_a, hands_b), tips(b, hands_b, hands_a)

@@ -1,0 +1,41 @@
+"""What can go wrong, as one tree: each error knows the exit code of the command line."""
+
+from __future__ import annotations
+
+
+class UsdHandError(Exception):
+    """Base of all errors that a person should read: says what is wrong, where, and what to do."""
+
+    exit_code = 1
+
+
+class CheckFailedError(UsdHandError):
+    """A check or a comparison did not hold (exit 1)."""
+
+
+class UsageError(UsdHandError):
+    """The arguments contradict each other or cannot be carried out (exit 2)."""
+
+    exit_code = 2
+
+
+class OutputError(UsageError):
+    """The output exists, equals an input, or cannot be written (exit 2)."""
+
+
+class InputError(UsdHandError):
+    """A file is missing, unreadable, or holds motion that cannot be used (exit 3)."""
+
+    exit_code = 3
+
+
+class HandNotFoundError(UsdHandError):
+    """No hand was found, or two candidates claim the same place (exit 4)."""
+
+    exit_code = 4
+
+
+class QualityError(UsdHandError):
+    """A quality limit that was asked for cannot be met (exit 5)."""
+
+    exit_code = 5

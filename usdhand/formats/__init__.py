@@ -1,0 +1,1 @@
+"""Motion files: read into clips, written from clips. The only package that knows file formats."""

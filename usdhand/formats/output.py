@@ -1,0 +1,55 @@
+"""Outputs that are whole or not there, and never an input."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from usdhand.errors import OutputError
+
+
+def check_output(output: Path, inputs: Iterable[Path], force: bool, suffixes: Iterable[str]) -> None:
+    """Refuse an output before any work is done.
+
+    Raises
+    ------
+    OutputError
+        if its format is unknown, it is one of the inputs, it exists and ``force`` is not given, or
+        its folder is missing or read-only.
+    """
+    if output.suffix.lower() not in tuple(suffixes):
+        raise OutputError(
+            f"{output}: cannot write '{output.suffix}' files; use one of {', '.join(suffixes)}."
+        )
+    for path in inputs:
+        if path.exists() and output.exists() and path.samefile(output):
+            raise OutputError(f"{output} is an input of this command; inputs are never changed.")
+    if output.is_dir():
+        raise OutputError(f"{output} is a folder; give a file.")
+    if output.exists() and not force:
+        raise OutputError(f"{output} exists; use --force to replace it.")
+    folder = output.absolute().parent
+    if not folder.is_dir():
+        raise OutputError(f"{folder}: no such folder to write {output.name} to.")
+    try:
+        # Not os.access: it tells nothing for root, nor on network drives.
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot write there ({error.strerror}).") from error
+
+
+@contextmanager
+def written_beside(output: Path) -> Iterator[Path]:
+    """A path in the output's folder that replaces it once the block has ended without an error."""
+    temporary = output.with_name(f".{output.stem}.{os.getpid()}.tmp{output.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, output)  # noqa: PTH105  (atomic on every system)
+    except OSError as error:
+        raise OutputError(f"{output}: cannot be written ({error.strerror or error}).") from error
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,1 @@
+"""OpenUSD: UsdSkel characters read into clips, results written as layers."""

@@ -1,0 +1,189 @@
+"""Rules for the animation of a skeleton: its binding, its joints, every sample of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdSkel
+
+from usdhand.formats.usd.check_skeleton import some
+from usdhand.formats.usd.findings import Finding, Severity
+from usdhand.formats.usd.stage import binding_prim
+from usdhand.motion import leaf_name
+
+UNIT_TOLERANCE = 1e-3
+TIME_TOLERANCE = 1e-6  # time codes
+
+
+def animation_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
+    """Everything that is wrong with the animation that a skeleton is bound to."""
+    yield from _binding_findings(skeleton)
+    source = UsdSkel.BindingAPI(skeleton).GetInheritedAnimationSource()
+    if not source or not source.IsA(UsdSkel.Animation):
+        return
+    yield from _joint_findings(skeleton, source)
+    yield from _time_findings(source)
+    yield from _value_findings(source)
+
+
+def _binding_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
+    owner = binding_prim(skeleton)
+    targets = UsdSkel.BindingAPI(owner).GetAnimationSourceRel().GetTargets()
+    where = str(owner.GetPath())
+    if not targets:
+        yield Finding("warning", "no-animation", "no animation is bound to the skeleton", where)
+    elif not (bound := skeleton.GetStage().GetPrimAtPath(targets[0])):
+        yield Finding("error", "no-such-animation", f"{targets[0]} is bound, but not there", where)
+    elif not bound.IsA(UsdSkel.Animation):
+        yield Finding(
+            "error", "no-such-animation", f"{targets[0]} is bound, but no SkelAnimation", where
+        )
+    prim = owner.GetParent()
+    while prim and not prim.IsPseudoRoot():
+        overruled = UsdSkel.BindingAPI(prim).GetAnimationSourceRel()
+        if overruled and overruled.GetTargets() not in ([], targets):
+            yield Finding(
+                "warning",
+                "lost-binding",
+                f"binds {overruled.GetTargets()[0]}, but the binding on {where} below wins: "
+                "override it there",
+                str(prim.GetPath()),
+            )
+        prim = prim.GetParent()
+
+
+def _joint_findings(skeleton: Usd.Prim, source: Usd.Prim) -> Iterator[Finding]:
+    where = str(source.GetPath())
+    known = {str(joint) for joint in UsdSkel.Skeleton(skeleton).GetJointsAttr().Get() or ()}
+    listed = [str(joint) for joint in UsdSkel.Animation(source).GetJointsAttr().Get() or ()]
+    unknown = [joint for joint in listed if joint not in known]
+    if len(unknown) == len(listed):
+        yield Finding(
+            "error",
+            "no-joints-animated",
+            f"it animates no joint of {skeleton.GetPath()}; it lists {some(listed) or 'none'}",
+            where,
+        )
+    elif unknown:
+        yield Finding(
+            "warning",
+            "unknown-joints",
+            f"{len(unknown)} animated joints are not in {skeleton.GetPath()}: {some(unknown)}",
+            where,
+        )
+
+
+def _time_findings(source: Usd.Prim) -> Iterator[Finding]:
+    stage, where = source.GetStage(), str(source.GetPath())
+    times = UsdSkel.Animation(source).GetRotationsAttr().GetTimeSamples()
+    if not times:
+        yield Finding(
+            "warning",
+            "static-rotations",
+            "the rotations have no time samples: Blender shows the rest pose",
+            where,
+        )
+        return
+    start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    root = stage.GetRootLayer()
+    if not (root.HasStartTimeCode() and root.HasEndTimeCode()):
+        yield Finding(
+            "warning",
+            "no-time-range",
+            f"the stage has no start or end; the animation has {times[0]:g} to {times[-1]:g}",
+            root.identifier,
+        )
+    elif times[0] < start - TIME_TOLERANCE or times[-1] > end + TIME_TOLERANCE:
+        yield Finding(
+            "warning",
+            "time-range",
+            f"the stage plays {start:g} to {end:g}, the animation has {times[0]:g} to "
+            f"{times[-1]:g}",
+            where,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """All samples of a motion attribute: a row a time, or the default value and no times."""
+
+    path: str
+    joints: list[str]
+    times: list[float]
+    rows: list[Any]
+
+    def at(self, rows: Iterable[int]) -> str:
+        """Where in time these rows are, in words."""
+        rows = list(rows)
+        first = f"time code {self.times[rows[0]]:g}" if self.times else "the default value"
+        return f"at {first}" + (f" and {len(rows) - 1} more" if len(rows) > 1 else "")
+
+
+def _value_findings(source: Usd.Prim) -> Iterator[Finding]:
+    animation = UsdSkel.Animation(source)
+    joints = [leaf_name(str(joint)) for joint in animation.GetJointsAttr().Get() or ()]
+    for attribute in (
+        animation.GetRotationsAttr(),
+        animation.GetTranslationsAttr(),
+        animation.GetScalesAttr(),
+    ):
+        if not attribute.HasAuthoredValue():
+            yield Finding(
+                "error",
+                f"missing-{attribute.GetName()}",
+                f"there are no {attribute.GetName()}: without all three of rotations, "
+                "translations and scales UsdSkel shows the rest pose",
+                str(source.GetPath()),
+            )
+            continue
+        times = attribute.GetTimeSamples()
+        query = Usd.AttributeQuery(attribute)
+        rows = [query.Get(time) for time in times] or [query.Get()]
+        yield from _track_findings(Track(str(attribute.GetPath()), joints, times, rows))
+
+
+def _track_findings(track: Track) -> Iterator[Finding]:
+    blocked = [i for i, row in enumerate(track.rows) if row is None]
+    if blocked:
+        yield Finding("error", "blocked-sample", f"blocked {track.at(blocked)}", track.path)
+    count = len(track.joints)
+    wrong = [i for i, row in enumerate(track.rows) if row is not None and len(row) != count]
+    if wrong:
+        message = f"{len(track.rows[wrong[0]])} values for {count} joints {track.at(wrong)}"
+        yield Finding("error", "array-length", message, track.path)
+    whole = [i for i, row in enumerate(track.rows) if row is not None and len(row) == count]
+    if not whole or not count:
+        return
+    values = np.array([track.rows[i] for i in whole], dtype=np.float64)
+    for severity, code, message, bad in _number_rules(values):
+        if bad.any():
+            names = [track.joints[int(j)] for j in np.flatnonzero(bad.any(axis=0))]
+            frames = [whole[int(i)] for i in np.flatnonzero(bad.any(axis=1))]
+            yield Finding(
+                severity, code, f"{message}: {some(names)} {track.at(frames)}", track.path
+            )
+
+
+def _number_rules(
+    values: NDArray[np.float64],
+) -> Iterator[tuple[Severity, str, str, NDArray[np.bool_]]]:
+    """Severity, code and message of each rule, with the (samples, joints) that break it."""
+    yield "error", "not-a-number", "not a number", ~np.all(np.isfinite(values), axis=2)
+    if values.shape[2] != 4:
+        return
+    norms = np.linalg.norm(values, axis=2)
+    zero = norms < UNIT_TOLERANCE
+    yield "error", "zero-quaternion", "zero-length quaternion", zero
+    long = ~zero & (np.abs(norms - 1.0) > UNIT_TOLERANCE)
+    yield "error", "non-unit-quaternion", "quaternion of another length than one", long
+    flips = np.zeros(norms.shape, dtype=bool)
+    flips[1:] = np.einsum("tji,tji->tj", values[1:], values[:-1]) < 0
+    message = (
+        "quaternions change sign between neighbours; tools that interpolate the four numbers turn "
+        "the long way"
+    )
+    yield "warning", "sign-flip", message, flips

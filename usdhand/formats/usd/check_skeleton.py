@@ -1,0 +1,164 @@
+"""Rules for a skeleton: its joints, its poses, and what it stands under."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel
+
+from usdhand.formats.usd.findings import Finding
+from usdhand.formats.usd.poses import MISPLACED_BIND_CM
+from usdhand.formats.usd.world import world_problems
+from usdhand.motion import leaf_name, parents_from_paths
+
+SHOWN = 3  # examples in one message
+
+
+def skeleton_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
+    """Everything that is wrong with a skeleton itself."""
+    where = str(skeleton.GetPath())
+    tokens = UsdSkel.Skeleton(skeleton).GetJointsAttr().Get()
+    joints = [str(token) for token in tokens or ()]
+    if not joints:
+        yield Finding("error", "no-joints", "the skeleton lists no joints", where)
+        return
+    yield from _name_findings(joints, where)
+    yield from _order_findings(joints, where)
+    yield from _pose_findings(skeleton, joints, where)
+    for problem in world_problems(skeleton):
+        yield Finding("warning", problem.code, problem.message, problem.where)
+
+
+def legal_name(name: str) -> str:
+    """Nearest name that USD takes as a prim: ``mixamorig:Hips`` -> ``mixamorig_Hips``."""
+    legal = re.sub(r"\W", "_", name)
+    return legal if legal and not legal[0].isdigit() else f"_{legal}"
+
+
+def _name_findings(joints: Sequence[str], where: str) -> Iterator[Finding]:
+    names = dict.fromkeys(part for joint in joints for part in joint.split("/"))
+    illegal = [name for name in names if not Sdf.Path.IsValidIdentifier(name)]
+    if illegal:
+        renamed = [f"'{name}' to '{legal_name(name)}'" for name in illegal]
+        yield Finding(
+            "error",
+            "illegal-joint-name",
+            f"{len(illegal)} joint names are no legal prim names: USD then sees no hierarchy and "
+            f"Blender makes no bones. Rename {some(renamed)}",
+            where,
+        )
+    double = [joint for joint, count in Counter(joints).items() if count > 1]
+    if double:
+        yield Finding("error", "duplicate-joint", f"listed twice: {some(double)}", where)
+    shared = [n for n, count in Counter(map(leaf_name, set(joints))).items() if count > 1]
+    if shared:
+        yield Finding(
+            "warning",
+            "duplicate-joint-name",
+            f"{len(shared)} names belong to several joints, which tools that drop the hierarchy "
+            f"confuse: {some(shared)}",
+            where,
+        )
+
+
+def _order_findings(joints: Sequence[str], where: str) -> Iterator[Finding]:
+    parents = parents_from_paths(joints)
+    late = [joints[int(j)] for j in np.flatnonzero(parents > np.arange(len(joints)))]
+    if late:
+        yield Finding(
+            "error",
+            "joint-order",
+            f"{len(late)} joints are listed before their parents, so UsdSkel refuses the "
+            f"skeleton: {some(late)}",
+            where,
+        )
+
+
+def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Iterator[Finding]:
+    api = UsdSkel.Skeleton(skeleton)
+    poses: dict[str, NDArray[np.float64]] = {}
+    for name, attribute in (
+        ("bind", api.GetBindTransformsAttr()),
+        ("rest", api.GetRestTransformsAttr()),
+    ):
+        matrices = np.array(attribute.Get() or [], dtype=np.float64).reshape(-1, 4, 4)
+        if not len(matrices):
+            yield Finding(
+                "error",
+                f"missing-{name}",
+                f"there are no {name} transforms, without which UsdSkel and Blender cannot pose it",
+                where,
+            )
+        elif len(matrices) != len(joints):
+            yield Finding(
+                "error",
+                f"{name}-length",
+                f"{len(matrices)} {name} transforms for {len(joints)} joints",
+                where,
+            )
+        elif bad := [joints[int(j)] for j in np.flatnonzero(~_usable(matrices))]:
+            yield Finding(
+                "error",
+                f"bad-{name}",
+                f"{len(bad)} {name} transforms are singular or no numbers: {some(bad)}",
+                where,
+            )
+        else:
+            poses[name] = matrices
+    if len(poses) == 2:
+        cm = 100.0 * UsdGeom.GetStageMetersPerUnit(skeleton.GetStage()) * _scale_above(skeleton)
+        offsets = _first_offsets(skeleton, joints, poses["rest"][:, 3, :3])
+        unplaced = _unplaced(poses["bind"], offsets, parents_from_paths(joints), cm)
+        if len(unplaced):
+            yield Finding(
+                "warning",
+                "identity-bind",
+                f"{len(unplaced)} joints have an identity bind transform (Maya writes that where "
+                f"no skin uses a joint): {some([leaf_name(joints[j]) for j in unplaced])}",
+                where,
+            )
+
+
+def _usable(matrices: NDArray[np.float64]) -> NDArray[np.bool_]:
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+    volume = np.linalg.det(np.where(finite[:, None, None], matrices, np.eye(4))[:, :3, :3])
+    return np.asarray(finite & (np.abs(volume) > 1e-12))
+
+
+def _unplaced(
+    bind: NDArray[np.float64], offsets: NDArray[np.float64], parents: NDArray[np.intp], cm: float
+) -> NDArray[np.intp]:
+    """Joints with an identity bind transform whose bones have another length."""
+    identity = np.abs(bind - np.eye(4)).max(axis=(1, 2)) < 1e-6
+    at_bind = np.linalg.norm(bind[:, 3, :3] - bind[parents, 3, :3], axis=1)
+    away = np.abs(at_bind - np.linalg.norm(offsets, axis=1)) * cm > MISPLACED_BIND_CM
+    return np.flatnonzero(identity & (parents >= 0) & away)
+
+
+def _first_offsets(
+    skeleton: Usd.Prim, joints: Sequence[str], rest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Joint-to-parent translations of the first frame, since Maya spoils rest along with bind."""
+    offsets = rest.copy()
+    animation = UsdSkel.Animation(UsdSkel.BindingAPI(skeleton).GetInheritedAnimationSource())
+    if animation:
+        listed = [str(joint) for joint in animation.GetJointsAttr().Get() or ()]
+        values = animation.GetTranslationsAttr().Get(Usd.TimeCode.EarliestTime()) or ()
+        given = dict(zip(listed, values, strict=False))
+        for j, joint in enumerate(joints):
+            offsets[j] = given.get(joint, offsets[j])
+    return offsets
+
+
+def _scale_above(prim: Usd.Prim) -> float:
+    matrix: Gf.Matrix4d = UsdGeom.XformCache().GetLocalToWorldTransform(prim)
+    return float(np.cbrt(abs(matrix.GetDeterminant3())))
+
+
+def some(names: Sequence[str]) -> str:
+    """A few of many names, for a message."""
+    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")

@@ -1,0 +1,165 @@
+"""Rest and bind pose of a skeleton, repaired where exporters leave them out or in other space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import UsdSkel
+
+from usdhand.formats.usd.stage import Character
+from usdhand.formats.usd.world import World
+from usdhand.motion import Problem, Skeleton
+from usdhand.motion import rotations as rot
+from usdhand.motion.rotations import Array
+
+MISPLACED_BIND_CM = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class AuthoredPoses:
+    """Rest and bind matrices as the file has them (column vectors, cm), None where unusable."""
+
+    rest: Array | None
+    bind: Array | None
+
+    def neutral_locals(self, parents: NDArray[np.intp]) -> Array:
+        """Joint-to-parent matrices where an animation says nothing: rest, as USD defines it."""
+        return rigid(self.rest) if self.rest is not None else self.bind_locals(parents)
+
+    def bind_locals(self, parents: NDArray[np.intp]) -> Array:
+        """Joint-to-parent matrices of the bind pose, of the rest pose where there is no bind."""
+        if self.bind is not None:
+            above = np.where((parents >= 0)[:, None, None], self.bind[parents], np.eye(4))
+            return rigid(np.linalg.inv(above) @ self.bind)
+        if self.rest is not None:
+            return rigid(self.rest)
+        return np.broadcast_to(np.eye(4), (len(parents), 4, 4))
+
+
+def authored_poses(
+    character: Character, joints: int, scale: float
+) -> tuple[AuthoredPoses, tuple[Problem, ...]]:
+    """Read the poses of a skeleton; what is missing comes back as problems."""
+    skeleton = UsdSkel.Skeleton(character.skeleton)
+    rest = _matrices(skeleton.GetRestTransformsAttr().Get(), joints, scale)
+    bind = _matrices(skeleton.GetBindTransformsAttr().Get(), joints, scale)
+    where = str(character.skeleton.GetPath())
+    problems = tuple(
+        Problem(f"missing-{name}", f"{name} transforms are missing or do not fit the joints", where)
+        for name, value in (("bind", bind), ("rest", rest))
+        if value is None
+    )
+    return AuthoredPoses(rest, bind), problems
+
+
+def placed_skeleton(
+    joints: tuple[str, ...],
+    parents: NDArray[np.intp],
+    poses: AuthoredPoses,
+    world: World,
+    first_frame: Array,
+) -> tuple[Skeleton, tuple[Problem, ...]]:
+    """Skeleton in Y-up centimetres.
+
+    ``first_frame`` (joints, 4, 4), joint-to-parent and already placed in the world, stands in for
+    a bind pose that is missing, and tells in which space the bind pose was written.
+    """
+    rest = poses.neutral_locals(parents).copy()
+    roots = parents < 0
+    rest[roots] = _transformed(rest[roots], world.rotation[0], world.translation[0])
+    skeleton = Skeleton(joints, parents, first_frame, rest)
+    if poses.bind is None:
+        local = rest if poses.rest is not None else first_frame
+        return replace(skeleton, bind=_accumulate(skeleton, local)), ()
+    posed = _accumulate(skeleton, first_frame)
+    in_skeleton_space = _transformed(poses.bind, world.rotation[0], world.translation[0])
+    in_world_space = _transformed(poses.bind, world.axes, np.zeros(3))
+    # UsdSkel's documentation says world space, Blender writes skeleton space, Maya world space.
+    bind = max(
+        (in_skeleton_space, in_world_space),
+        key=lambda b: _agreement(_bones(b, parents), posed, parents),
+    )
+    identity = np.abs(poses.bind - np.eye(4)).max(axis=(1, 2)) < 1e-6
+    return _repair_unskinned(replace(skeleton, bind=bind), first_frame, identity)
+
+
+def rigid(matrices: Array) -> Array:
+    """Matrices (..., 4, 4) without scale, shear and reflection."""
+    u, _, vt = np.linalg.svd(matrices[..., :3, :3])
+    u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
+    result = matrices.copy()
+    result[..., :3, :3] = u @ vt
+    return result
+
+
+def local_matrices(rotations: Array, translations: Array) -> Array:
+    """Matrices (joints, 4, 4) of rotations (joints, 4) and translations (joints, 3)."""
+    matrices = np.tile(np.eye(4), (len(rotations), 1, 1))
+    matrices[:, :3, :3] = rot.to_matrix(rotations)
+    matrices[:, :3, 3] = translations
+    return matrices
+
+
+def _matrices(value: object, count: int, scale: float) -> Array | None:
+    matrices = np.asarray(value if value is not None else [], dtype=np.float64)
+    if matrices.shape != (count, 4, 4) or not np.isfinite(matrices).all():
+        return None
+    if (np.abs(np.linalg.det(matrices[:, :3, :3])) < 1e-12).any():
+        return None
+    matrices = np.swapaxes(matrices, 1, 2).copy()
+    matrices[:, :3, 3] *= scale
+    return matrices
+
+
+def _transformed(matrices: Array, rotation: Array, translation: Array) -> Array:
+    result = matrices.copy()
+    result[:, :3, :3] = rotation @ matrices[:, :3, :3]
+    result[:, :3, 3] = matrices[:, :3, 3] @ rotation.T + translation
+    return result
+
+
+def _accumulate(skeleton: Skeleton, local: Array) -> Array:
+    world = local.copy()
+    for j in skeleton.order:
+        p = int(skeleton.parents[j])
+        if p >= 0:
+            world[j] = world[p] @ local[j]
+    return world
+
+
+def _bones(matrices: Array, parents: NDArray[np.intp]) -> Array:
+    children = np.flatnonzero(parents >= 0)
+    bones = matrices[children, :3, 3] - matrices[parents[children], :3, 3]
+    length = np.linalg.norm(bones, axis=1, keepdims=True)
+    return np.asarray(bones / np.maximum(length, 1e-9))
+
+
+def _agreement(bones: Array, posed: Array, parents: NDArray[np.intp]) -> float:
+    return float(np.sum(bones * _bones(posed, parents)))
+
+
+def _repair_unskinned(
+    skeleton: Skeleton, first_frame: Array, identity: NDArray[np.bool_]
+) -> tuple[Skeleton, tuple[Problem, ...]]:
+    """Place joints that no skin uses, for which Maya exports an identity bind transform."""
+    bind = skeleton.bind.copy()
+    repaired = []
+    for j in skeleton.order:
+        p = int(skeleton.parents[j])
+        if p < 0 or not identity[j]:
+            continue
+        expected = np.linalg.norm(first_frame[j, :3, 3])
+        actual = np.linalg.norm(bind[j, :3, 3] - bind[p, :3, 3])
+        if abs(actual - expected) > MISPLACED_BIND_CM:
+            bind[j] = bind[p] @ first_frame[j]
+            repaired.append(skeleton.names[j])
+    if not repaired:
+        return skeleton, ()
+    message = (
+        f"{len(repaired)} joints have an identity bind transform (no skin uses them) and are "
+        "placed by the first frame"
+    )
+    where = ", ".join(repaired[:3]) + (", ..." if len(repaired) > 3 else "")
+    return replace(skeleton, bind=bind), (Problem("unplaced-bind", message, where),)

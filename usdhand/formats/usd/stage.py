@@ -1,0 +1,153 @@
+"""Opening stages and choosing a character on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
+
+from usdhand.errors import InputError, UsageError
+from usdhand.motion import Problem
+
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+
+
+@dataclass(frozen=True, eq=False)
+class Character:
+    """A skeleton on a stage with the animation bound to it, if any."""
+
+    stage: Usd.Stage
+    path: Path
+    skeleton: Usd.Prim
+    animation: Usd.Prim | None
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def root(self) -> Usd.Prim:
+        """The SkelRoot above the skeleton, or the skeleton's own parent where there is none."""
+        root = UsdSkel.Root.Find(self.skeleton)
+        if root:
+            return root.GetPrim()
+        parent = self.skeleton.GetParent()
+        return self.skeleton if parent.IsPseudoRoot() else parent
+
+
+@contextmanager
+def usd_diagnostics() -> Iterator[list[str]]:
+    """Collect what USD would print to stderr, as plain sentences."""
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    messages: list[str] = []
+    try:
+        yield messages
+    finally:
+        messages += [d.commentary.strip() for d in delegate.TakeUncoalescedDiagnostics()]
+        del delegate
+
+
+def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
+    """Open a stage; what could not be composed comes back as problems.
+
+    Raises
+    ------
+    InputError
+        if there is no such file, or USD cannot read it.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such file.")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder, not a USD file.")
+    if path.suffix.lower() not in USD_SUFFIXES:
+        raise InputError(
+            f"{path}: '{path.suffix}' is no USD file; expected one of {', '.join(USD_SUFFIXES)}."
+        )
+    stage = None
+    with usd_diagnostics() as messages:
+        try:
+            stage = Usd.Stage.Open(str(path))
+        except Tf.ErrorException as error:
+            messages += [e.commentary.strip() for e in error.args]
+    if stage is None:
+        detail = f" ({_first_line(messages[0])})" if messages else ""
+        raise InputError(f"{path}: USD cannot read this file; it may be damaged or no USD{detail}.")
+    problems = [
+        Problem("composition", f"not everything could be composed: {_first_line(str(error))}")
+        for error in stage.GetCompositionErrors()
+    ]
+    if not problems:
+        problems = [Problem("usd", _first_line(message)) for message in messages]
+    return stage, tuple(problems)
+
+
+def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
+    """All skeletons that are on the stage, those inside instances included."""
+    everything = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    return [prim for prim in everything if prim.IsA(UsdSkel.Skeleton)]
+
+
+def find_character(path: Path, skel: str | None = None) -> Character:
+    """Open ``path`` and choose its character.
+
+    Parameters
+    ----------
+    skel : path or name of the skeleton (or of a prim above it), needed where there are several
+
+    Raises
+    ------
+    InputError
+        if the file cannot be read or holds no skeleton.
+    UsageError
+        if several skeletons are there and ``skel`` does not choose one.
+    """
+    stage, problems = open_stage(path)
+    skeletons = find_skeletons(stage)
+    if not skeletons:
+        lost = f" Note: {problems[0]}." if problems else ""
+        raise InputError(f"{path}: no UsdSkel skeleton on this stage.{lost}")
+    prim = choose_skeleton(path, skeletons, skel)
+    return Character(stage, path, prim, bound_animation(prim), problems)
+
+
+def bound_animation(skeleton: Usd.Prim) -> Usd.Prim | None:
+    """Return the SkelAnimation that drives a skeleton: bound on it or inherited."""
+    prim = UsdSkel.BindingAPI(skeleton).GetInheritedAnimationSource()
+    return prim if prim and prim.IsA(UsdSkel.Animation) else None
+
+
+def binding_prim(skeleton: Usd.Prim) -> Usd.Prim:
+    """Return the prim whose ``skel:animationSource`` is in force: overriding elsewhere loses."""
+    prim = skeleton
+    while prim and not prim.IsPseudoRoot():
+        relationship = UsdSkel.BindingAPI(prim).GetAnimationSourceRel()
+        if relationship and relationship.HasAuthoredTargets():
+            return prim
+        prim = prim.GetParent()
+    return skeleton
+
+
+def choose_skeleton(path: Path, skeletons: list[Usd.Prim], skel: str | None) -> Usd.Prim:
+    """Return the skeleton that ``skel`` means, or the one that is there; see `find_character`."""
+    names = ", ".join(str(s.GetPath()) for s in skeletons)
+    if skel is None:
+        animated = [s for s in skeletons if bound_animation(s)]
+        if len(skeletons) == 1:
+            return skeletons[0]
+        if len(animated) == 1:
+            return animated[0]
+        raise UsageError(
+            f"{path} holds {len(skeletons)} skeletons; choose one with --skel: {names}"
+        )
+    if skel.startswith("/") and Sdf.Path.IsValidPathString(skel):
+        found = [s for s in skeletons if s.GetPath().HasPrefix(Sdf.Path(skel))]
+    else:
+        found = [s for s in skeletons if skel in str(s.GetPath()).split("/")]
+    if len(found) == 1:
+        return found[0]
+    reason = "no skeleton" if not found else f"{len(found)} skeletons"
+    raise UsageError(f"{path}: --skel {skel} matches {reason}; there are: {names}")
+
+
+def _first_line(text: str) -> str:
+    return text.strip().splitlines()[0].rstrip(".") if text.strip() else "no reason given"

@@ -1,0 +1,104 @@
+"""A clip: a skeleton and its local transforms sampled at a steady rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from usdhand.motion.rotations import Array
+from usdhand.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something a person should know about a file, that did not stop the work.
+
+    ``code`` is a stable name for scripts, ``where`` a prim, joint or frame.
+    """
+
+    code: str
+    message: str
+    where: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.message} ({self.where})" if self.where else self.message
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """Where a clip was read from, and what its file measures in: enough to write it back.
+
+    Attributes
+    ----------
+    path : the file, None for a clip made in memory
+    skeleton_path, animation_path : prims in that file ("" if there are none)
+    time_codes_per_second : of the stage
+    first_time_code : time code of the clip's first frame
+    time_codes_per_frame : distance of two frames in time codes
+    cm_per_unit : centimetres of one unit of the joints' own space
+    up_axis : "Y" or "Z", of the stage
+    """
+
+    path: Path | None = None
+    skeleton_path: str = ""
+    animation_path: str = ""
+    time_codes_per_second: float = 24.0
+    first_time_code: float = 0.0
+    time_codes_per_frame: float = 1.0
+    cm_per_unit: float = 1.0
+    up_axis: str = "Y"
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """Motion of one character: centimetres, seconds, Y up.
+
+    Whatever stands above the skeleton in its file (units, axes, placement, animated or not) is
+    part of the root joints' transforms, so that forward kinematics gives world space.
+
+    Attributes
+    ----------
+    rotations : (frames, joints, 4) joint-to-parent unit quaternions (x, y, z, w), continuous
+    translations : (frames, joints, 3) joint-to-parent, cm
+    scales : (frames, joints, 3); all ones for nearly every clip
+    fps : frames a second
+    """
+
+    skeleton: Skeleton
+    rotations: Array
+    translations: Array
+    scales: Array
+    fps: float
+    name: str = ""
+    origin: Origin = field(default_factory=Origin)
+    problems: tuple[Problem, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    @property
+    def start(self) -> float:
+        """Time of the first frame in its file, seconds."""
+        return self.origin.first_time_code / self.origin.time_codes_per_second
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last."""
+        return (len(self) - 1) / self.fps
+
+    @property
+    def times(self) -> Array:
+        """(frames,) seconds in the time of its file."""
+        return self.start + np.arange(len(self)) / self.fps
+
+    @property
+    def time_codes(self) -> Array:
+        """(frames,) time codes in its file."""
+        o = self.origin
+        return o.first_time_code + np.arange(len(self)) * o.time_codes_per_frame
+
+    def with_rotations(self, rotations: Array) -> Clip:
+        """Return the same clip with other joint rotations."""
+        return replace(self, rotations=rotations)

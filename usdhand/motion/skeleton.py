@@ -1,0 +1,120 @@
+"""The skeleton of a character: joints, parents, rest and bind pose, in centimetres and Y up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usdhand.motion.rotations import Array
+
+
+def leaf_name(joint: str) -> str:
+    """Last part of a joint path: ``Hips/Spine/Head`` -> ``Head``."""
+    return joint.rsplit("/", 1)[-1]
+
+
+def parents_from_paths(joints: Iterable[str]) -> NDArray[np.intp]:
+    """Index of each joint's nearest ancestor in the list, -1 for roots; shape (joints,).
+
+    Paths are parsed as text: USD's own parser gives -1 for tokens that are no valid prim names,
+    and real files have those. An ancestor that is not listed is passed over, as UsdSkel does.
+    """
+    joints = list(joints)
+    index = {joint: i for i, joint in enumerate(joints)}
+
+    def nearest(joint: str) -> int:
+        while "/" in joint:
+            joint = joint.rsplit("/", 1)[0]
+            if joint in index:
+                return index[joint]
+        return -1
+
+    return np.array([nearest(joint) for joint in joints], dtype=np.intp)
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Joints and their two reference poses.
+
+    Attributes
+    ----------
+    joints : full paths (``Hips/Spine``), in the file's order
+    parents : (joints,) index of the parent, -1 for a root
+    bind : (joints, 4, 4) joint-to-world matrices of the bind pose, for column vectors, cm
+    rest : (joints, 4, 4) joint-to-parent matrices of the rest pose, cm
+    """
+
+    joints: tuple[str, ...]
+    parents: NDArray[np.intp]
+    bind: Array
+    rest: Array
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Leaf names of the joints."""
+        return tuple(leaf_name(joint) for joint in self.joints)
+
+    @cached_property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """Indices of each joint's children."""
+        found: list[list[int]] = [[] for _ in self.joints]
+        for child, parent in enumerate(self.parents):
+            if parent >= 0:
+                found[parent].append(child)
+        return tuple(tuple(c) for c in found)
+
+    @cached_property
+    def bind_positions(self) -> Array:
+        """(joints, 3) world positions at the bind pose, cm."""
+        return self.bind[:, :3, 3]
+
+    @cached_property
+    def bind_rotations(self) -> Array:
+        """(joints, 3, 3) world orientations at the bind pose, without scale or shear."""
+        u, _, vt = np.linalg.svd(self.bind[:, :3, :3])
+        sign = np.sign(np.linalg.det(u @ vt))
+        u[:, :, 2] *= sign[:, None]
+        return np.asarray(u @ vt)
+
+    @cached_property
+    def order(self) -> tuple[int, ...]:
+        """Joint indices with every parent before its children."""
+        return tuple(sorted(range(len(self)), key=self.depth))
+
+    def depth(self, joint: int) -> int:
+        """Return the number of ancestors of a joint."""
+        return len(self.ancestors(joint))
+
+    def ancestors(self, joint: int) -> tuple[int, ...]:
+        """Return the joints above ``joint``, the parent first."""
+        found = []
+        while (joint := int(self.parents[joint])) >= 0:
+            found.append(joint)
+        return tuple(found)
+
+    def with_ancestors(self, joints: Iterable[int]) -> tuple[int, ...]:
+        """Return ``joints`` and all joints above them, every parent before its children."""
+        wanted = set(joints)
+        for joint in tuple(wanted):
+            wanted.update(self.ancestors(joint))
+        return tuple(j for j in self.order if j in wanted)
+
+    def common_ancestor(self, joints: Iterable[int]) -> int | None:
+        """Return the lowest joint that is above or equal to all of ``joints``."""
+        lines = [(joint, *self.ancestors(joint)) for joint in joints]
+        shared = set(lines[0]).intersection(*lines[1:])
+        return next((joint for joint in lines[0] if joint in shared), None)
+
+    def find(self, name: str) -> int | None:
+        """Index of the joint with this full path or, if only one has it, this leaf name."""
+        if name in self.joints:
+            return self.joints.index(name)
+        matches = [i for i, leaf in enumerate(self.names) if leaf == name]
+        return matches[0] if len(matches) == 1 else None

@@ -1,0 +1,165 @@
+"""Reduce and expand: clips to a rig of few channels, and back to motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from usdhand.anatomy.channels import Channels, Hands
+from usdhand.errors import InputError, UsageError
+from usdhand.motion import Clip
+from usdhand.reduce.errors import Errors, measure_errors
+from usdhand.reduce.fit import Fit, Statistics, Thresholds, fit_relations
+from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.search import thresholds_for_count, thresholds_for_error
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a reduction aims at: exactly one of the three."""
+
+    thresholds: Thresholds | None = None
+    free_channels: int | None = None
+    max_error: float | None = None
+
+    def __post_init__(self) -> None:
+        given = [x is not None for x in (self.thresholds, self.free_channels, self.max_error)]
+        if sum(given) != 1:
+            raise UsageError("Give either thresholds, a number of channels, or a largest error.")
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """A clip in terms of a rig.
+
+    Attributes
+    ----------
+    free : curves of the rig's free channels
+    reduced : all channels as the rig gives them, held ones included
+    errors : of the modelled channels against the model (what reduction loses)
+    model_errors : of all 45 channels a hand when only 25 move (what the model loses)
+    total_errors : of all channels against the source
+    """
+
+    clip: Clip
+    hands: Hands
+    rig: ReducedRig
+    free: Channels
+    reduced: Channels
+    errors: Errors
+    model_errors: Errors
+    total_errors: Errors
+
+    @property
+    def motion(self) -> Clip:
+        """The clip with its hands as the rig gives them."""
+        return self.hands.decode(self.reduced, self.clip)
+
+
+def fit_rig(
+    clips: Sequence[Clip],
+    hands: Sequence[Hands],
+    target: Target,
+    fit: Fit = "paper",
+    most_controllers: int = 1,
+) -> ReducedRig:
+    """Fit one rig to all clips together (Joerg & O'Sullivan 2009).
+
+    Raises
+    ------
+    InputError
+        if a clip has fewer than two frames, or the clips' hands have different joints.
+    UsageError
+        if settings contradict each other.
+    """
+    if most_controllers > 1 and fit == "paper":
+        raise UsageError("Several controllers a channel need the least-squares fit.")
+    for clip in clips:
+        if len(clip) < 2:
+            raise InputError(
+                f"{clip.origin.path or clip.name} has one frame: what moves cannot be told from it."
+            )
+    names = hands[0].model_names
+    for clip, other in zip(clips, hands, strict=True):
+        if other.model_names != names:
+            raise InputError(
+                f"{clip.origin.path or clip.name} has other hand joints than {clips[0].name}: fit "
+                "them apart."
+            )
+    encoded = [h.encode(c) for c, h in zip(clips, hands, strict=True)]
+    modelled = np.concatenate([e.select(names).values for e in encoded])
+    statistics = Statistics.of(modelled)
+    thresholds = _thresholds(statistics, target, fit)
+    others = tuple(n for n in hands[0].all_names if n not in set(names))
+    held = np.concatenate([e.select(others).values for e in encoded]).mean(axis=0)
+    return ReducedRig(
+        fit_relations(names, statistics, thresholds, fit, most_controllers),
+        dict(zip(others, (float(v) for v in held), strict=True)),
+        thresholds.range,
+        thresholds.rmsd,
+        fit,
+        tuple(clip.name for clip in clips),
+    )
+
+
+def apply_rig(rig: ReducedRig, clip: Clip, hands: Hands) -> Reduction:
+    """Express a clip, fitted or not, in the free channels of a rig.
+
+    Raises
+    ------
+    UsageError
+        if the rig has channels that the clip's hands lack.
+    """
+    source = hands.encode(clip)
+    missing = sorted({*rig.names, *rig.held} - set(source.names))
+    if missing:
+        raise UsageError(
+            f"The rig has the channel '{missing[0]}' that the hands of {clip.name} do not have "
+            f"({len(missing)} such channels)."
+        )
+    free = source.select(rig.free)
+    reduced = rig.evaluate(free)
+    # Channels of this hand that the rig knows nothing of keep their motion.
+    own = Channels(source.names, source.values.copy())
+    index = {name: i for i, name in enumerate(own.names)}
+    own.values[:, [index[name] for name in reduced.names]] = reduced.values
+    model = Channels(own.names, own.values.copy())
+    modelled = [index[name] for name in rig.names]
+    model.values[:, modelled] = source.values[:, modelled]
+    return Reduction(
+        clip,
+        hands,
+        rig,
+        free,
+        own,
+        errors=measure_errors(model, own, rig.names, clip, hands),
+        model_errors=measure_errors(source, model, tuple(rig.held), clip, hands),
+        total_errors=measure_errors(source, own, source.names, clip, hands),
+    )
+
+
+def expand(rig: ReducedRig, free: Channels, clip: Clip, hands: Hands) -> Clip:
+    """Put a rig's motion on a clip's hands: dependent channels follow from the free ones.
+
+    ``clip`` gives the body and as many frames as ``free``; channels that its hands lack are left
+    out, channels that the rig lacks keep the clip's motion.
+    """
+    channels = rig.evaluate(free)
+    own = hands.encode(clip)
+    index = {name: i for i, name in enumerate(own.names)}
+    shared = [name for name in channels.names if name in index]
+    if not shared:
+        raise UsageError(f"The rig and {clip.name} have no channel in common.")
+    own.values[:, [index[name] for name in shared]] = channels.select(shared).values
+    return hands.decode(own, clip)
+
+
+def _thresholds(statistics: Statistics, target: Target, fit: Fit) -> Thresholds:
+    if target.thresholds is not None:
+        return target.thresholds
+    if target.free_channels is not None:
+        return thresholds_for_count(statistics, target.free_channels, fit)
+    assert target.max_error is not None
+    return thresholds_for_error(statistics, target.max_error, fit)

@@ -1,0 +1,1 @@
+"""Reports: results as plain data that scripts can rely on."""

@@ -1,0 +1,52 @@
+"""One JSON document a command: a schema version, how it was made, and the result.
+
+Studios script against these: keys are only ever added within a version.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import usdhand
+from usdhand.formats.hashing import file_hash
+
+SCHEMA_VERSION = 1
+
+
+def document(
+    verb: str, inputs: Sequence[Path], settings: Mapping[str, Any], result: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Wrap a result with what is needed to make it again."""
+    return {
+        "schema": f"usdhand.{verb}/{SCHEMA_VERSION}",
+        "usdhand": usdhand.__version__,
+        "inputs": [{"path": str(p), "sha256": file_hash(p)} for p in inputs],
+        "settings": dict(settings),
+        **result,
+    }
+
+
+def dumps(value: Mapping[str, Any]) -> str:
+    """JSON text; numbers that JSON does not know become null."""
+    return json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def rounded(value: float, digits: int = 6) -> float:
+    """A plain float, rounded so that reports can be compared."""
+    return round(float(value), digits)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Path):
+        return str(value)
+    return value
