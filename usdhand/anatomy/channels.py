@@ -9,30 +9,36 @@ gesture has the same angles on both hands.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from usdhand.anatomy.angles import (
+    euler_angles,
+    from_euler,
+    from_swing_twist,
+    inverse,
+    product,
+    same_signs,
+    swing_twist_angles,
+)
+from usdhand.anatomy.fingertips import fingertips as fingertips
 from usdhand.anatomy.frames import HandFrames, hand_frames
-from usdhand.anatomy.hand import SIDE_PREFIX, SIDES, CharacterMap, HandMap, Side
+from usdhand.anatomy.hand import SIDE_PREFIX, SIDES, CharacterMap, Side
 from usdhand.errors import UsageError
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
-# Order of the three angles of a joint in arrays, and the letter each has in a channel's name.
-ABDUCTION, FLEXION, TWIST = range(3)
+# The letters that abduction, flexion and twist have in a channel's name.
 FINGER_AXES = ("x", "y", "z")
 THUMB_AXES = ("x", "z", "y")
-
-# Beyond this abduction the other two angles are nearly one and the same; follow them in time.
-NEAR_LOCK_DEG = 75.0
 
 
 @dataclass(frozen=True, eq=False)
 class Channels:
-    """Named curves: ``values`` (frames, channels) in degrees."""
+    """Named curves: ``values`` (frames, channels) in degrees, every curve one run of memory."""
 
     names: tuple[str, ...]
     values: Array
@@ -42,11 +48,20 @@ class Channels:
 
     def select(self, names: Sequence[str]) -> Channels:
         """Return only the channels named, in that order."""
+        if tuple(names) == self.names:
+            return self
         index = {name: i for i, name in enumerate(self.names)}
         missing = [name for name in names if name not in index]
         if missing:
             raise UsageError(f"There is no channel '{missing[0]}' on this hand.")
-        return Channels(tuple(names), self.values[:, [index[name] for name in names]])
+        return Channels(tuple(names), self.values.T[[index[name] for name in names]].T)
+
+    def replaced(self, others: Channels) -> Channels:
+        """Return these channels with the curves of ``others``, which must be among them."""
+        index = {name: i for i, name in enumerate(self.names)}
+        rows = self.values.T.copy()
+        rows[[index[name] for name in others.names]] = others.values.T
+        return Channels(self.names, rows.T)
 
 
 def all_channels(side: Side, joints: Sequence[str]) -> tuple[str, ...]:
@@ -78,8 +93,36 @@ def encode(clip: Clip, frames: HandFrames) -> Channels:
     Channels
         (frames, 3 n) degrees, continuous in time, n the number of joints the rig has.
     """
-    angles = _relative_to_frames(clip, frames)
-    return _as_channels(frames, _angles(angles, frames))
+    rows = np.empty((3 * len(frames.names), len(clip)))
+    to_frames = _frame_matrices(frames)
+    foreign = _foreign(clip, frames)
+    for i, (name, joint) in enumerate(zip(frames.names, frames.joints, strict=True)):
+        local = clip.rotations[:, joint].T
+        if i in foreign:
+            local = product(inverse(foreign[i]), local)
+        take_apart = swing_twist_angles if _is_ball(name) else euler_angles
+        angles = take_apart(to_frames[i] @ local)
+        rows[3 * i : 3 * i + 3] = (angles * _mirror(frames))[_letters(name)]
+    return Channels(all_channels(frames.side, frames.names), rows.T)
+
+
+def local_rotations(channels: Channels, clip: Clip, frames: HandFrames) -> dict[int, Array]:
+    """Rotations (4, frames) that all channels of a hand give to its joints in the skeleton.
+
+    The clip gives the motion of what lies between a digit and the wrist where it does not hang
+    off it.
+    """
+    rows = channels.select(all_channels(frames.side, frames.names)).values.T
+    to_frames = _frame_matrices(frames)
+    foreign = _foreign(clip, frames)
+    found = {}
+    for i, (name, joint) in enumerate(zip(frames.names, frames.joints, strict=True)):
+        angles = np.empty((3, rows.shape[1]))
+        angles[_letters(name)] = rows[3 * i : 3 * i + 3]
+        put_together = from_swing_twist if _is_ball(name) else from_euler
+        local = to_frames[i].T @ put_together(angles * _mirror(frames))
+        found[int(joint)] = product(foreign[i], local) if i in foreign else local
+    return found
 
 
 def decode(channels: Channels, clip: Clip, frames: HandFrames) -> Clip:
@@ -94,23 +137,18 @@ def decode(channels: Channels, clip: Clip, frames: HandFrames) -> Clip:
     UsageError
         if channels are missing or the number of frames differs.
     """
+    return _decode(channels, clip, [frames])
+
+
+def _decode(channels: Channels, clip: Clip, hands: Iterable[HandFrames]) -> Clip:
     if len(channels.values) != len(clip):
         raise UsageError(
             f"Channels of {len(channels.values)} frames do not fit a clip of {len(clip)}."
         )
-    wanted = all_channels(frames.side, frames.names)
-    angles = _from_channels(frames, channels.select(wanted).values)
-    measured = _rotations(angles, frames)
-    relative = rot.multiply(
-        rot.multiply(frames.reference_frames, measured), rot.conjugate(frames.joint_frames)
-    )
     rotations = clip.rotations.copy()
-    foreign = _foreign(clip, frames)
-    for i, j in enumerate(frames.joints):
-        rotations[:, j] = (
-            rot.multiply(foreign[i], relative[:, i]) if i in foreign else relative[:, i]
-        )
-    rotations[:, frames.joints] = rot.make_continuous(rotations[:, frames.joints])
+    for frames in hands:
+        for joint, q in local_rotations(channels, clip, frames).items():
+            rotations[:, joint] = same_signs(q).T
     return clip.with_rotations(rotations)
 
 
@@ -145,154 +183,62 @@ class Hands:
         """All channels of all hands."""
         parts = [encode(clip, f) for f in self.frames.values()]
         return Channels(
-            tuple(n for p in parts for n in p.names), np.concatenate([p.values for p in parts], 1)
+            tuple(n for p in parts for n in p.names),
+            np.concatenate([p.values.T for p in parts]).T,
         )
 
     def decode(self, channels: Channels, clip: Clip) -> Clip:
         """Put channels of all hands on a clip."""
-        for frames in self.frames.values():
-            clip = decode(channels, clip, frames)
-        return clip
+        return _decode(channels, clip, self.frames.values())
 
-    def fingertips(self, clip: Clip) -> Array:
-        """(frames, hands * digits, 3) fingertip positions, see `fingertips`."""
+    def fingertips(self, clip: Clip, channels: Channels | None = None) -> Array:
+        """(frames, hands * digits, 3) positions of the tips from their wrist, in its palm, cm.
+
+        With ``channels``, of the clip as these would move its hands.
+        """
         return np.concatenate(
-            [fingertips(clip, self.character.hands[s], f) for s, f in self.frames.items()], axis=1
+            [
+                fingertips(
+                    clip,
+                    self.character.hands[side],
+                    frames,
+                    local_rotations(channels, clip, frames) if channels else None,
+                )
+                for side, frames in self.frames.items()
+            ],
+            axis=1,
         )
 
 
-def fingertips(clip: Clip, hand: HandMap, frames: HandFrames) -> Array:
-    """(frames, digits, 3) tip positions from the wrist in the axes of the palm, cm."""
-    last = [frames.last_joint(digit) for digit in frames.digits]
-    joints = [hand.wrist, *last]
-    pose = forward_kinematics(clip, joints, base=clip.skeleton.common_ancestor(joints))
-    wrist_q, wrist_p = pose.rotations[:, :1], pose.positions[:, :1]
-    world = pose.positions[:, 1:] + rot.rotate(pose.rotations[:, 1:], frames.tips[None])
-    palm = rot.multiply(wrist_q, frames.palm)
-    return rot.rotate(rot.conjugate(palm), world - wrist_p)
-
-
-def _relative_to_frames(clip: Clip, frames: HandFrames) -> Array:
-    """(frames, n, 4) rotations from the reference frame to the bone's frame."""
-    local = clip.rotations[:, frames.joints].copy()
-    for i, q in _foreign(clip, frames).items():
-        local[:, i] = rot.multiply(rot.conjugate(q), local[:, i])
-    return rot.multiply(
-        rot.multiply(rot.conjugate(frames.reference_frames), local), frames.joint_frames
-    )
+def _frame_matrices(frames: HandFrames) -> Array:
+    """(n, 4, 4) orthogonal matrices from local rotations to those between anatomical frames."""
+    units = np.eye(4)[None]  # the products of the four unit quaternions are the columns
+    before, after = rot.conjugate(frames.reference_frames)[:, None], frames.joint_frames[:, None]
+    return np.swapaxes(rot.multiply(rot.multiply(before, units), after), 1, 2)
 
 
 def _foreign(clip: Clip, frames: HandFrames) -> dict[int, Array]:
-    """Rotation from parent to reference joint, (frames, 4), of digits not below the wrist."""
+    """Rotation from parent to reference joint, (4, frames), of digits not below the wrist."""
     parents = clip.skeleton.parents[frames.joints]
     found = {}
     for i in np.flatnonzero(parents != frames.references):
         pair = [int(parents[i]), int(frames.references[i])]
         base = clip.skeleton.common_ancestor(pair)
         parent, reference = np.moveaxis(forward_kinematics(clip, pair, base).rotations, 1, 0)
-        found[int(i)] = rot.multiply(rot.conjugate(parent), reference)
+        found[int(i)] = rot.multiply(rot.conjugate(parent), reference).T
     return found
 
 
+def _is_ball(joint: str) -> bool:
+    return joint == "ThumbCMC"
+
+
 def _mirror(frames: HandFrames) -> Array:
-    return np.array([-1.0, 1.0, -1.0]) if frames.side == "left" else np.ones(3)
+    """Signs (3, 1) of the angles, by which both hands have the same for the same gesture."""
+    return np.array([[-1.0], [1.0], [-1.0]]) if frames.side == "left" else np.ones((3, 1))
 
 
-def _angles(q: Array, frames: HandFrames) -> Array:
-    """(frames, n, 3) degrees of rotations (frames, n, 4), continuous in time."""
-    result = np.empty((*q.shape[:-1], 3))
-    for i, name in enumerate(frames.names):
-        take_apart = _swing_twist_angles if name == "ThumbCMC" else _euler_angles
-        result[:, i] = take_apart(q[:, i])
-    return result * _mirror(frames)
-
-
-def _rotations(angles: Array, frames: HandFrames) -> Array:
-    """(frames, n, 4) rotations of angles (frames, n, 3) in degrees."""
-    radians = np.radians(angles * _mirror(frames))
-    result = np.empty((*angles.shape[:-1], 4))
-    for i, name in enumerate(frames.names):
-        put_together = _from_swing_twist if name == "ThumbCMC" else _from_euler
-        result[:, i] = put_together(radians[:, i])
-    return result
-
-
-def _euler_angles(q: Array) -> Array:
-    m = rot.to_matrix(q)
-    abduction = np.arctan2(-m[:, 1, 2], np.hypot(m[:, 1, 0], m[:, 1, 1]))
-    flexion = np.arctan2(m[:, 0, 2], m[:, 2, 2])
-    twist = np.arctan2(m[:, 1, 0], m[:, 1, 1])
-    angles = np.degrees(np.stack([abduction, flexion, twist], axis=-1))
-    if np.abs(angles[:, ABDUCTION]).max() > NEAR_LOCK_DEG:
-        angles = _followed(angles, m)
-    return _unwrapped(angles)
-
-
-def _followed(angles: Array, m: Array) -> Array:
-    """Choose, frame by frame, the one of both equivalent triples that is nearer to the last."""
-    result = angles.copy()
-    for t in range(1, len(angles)):
-        last = result[t - 1]
-        other = angles[t] * [-1.0, 1.0, 1.0] + 180.0
-        if np.hypot(m[t, 1, 0], m[t, 1, 1]) < 1e-6:  # locked: only flexion -+ twist is known
-            sign = np.sign(angles[t, ABDUCTION])
-            total = np.degrees(np.arctan2(sign * m[t, 0, 1], m[t, 0, 0]))
-            angles[t] = [angles[t, ABDUCTION], last[TWIST] * sign + total, last[TWIST]]
-            result[t] = angles[t]
-            continue
-        near = [c + 360.0 * np.round((last - c) / 360.0) for c in (angles[t], other)]
-        result[t] = min(near, key=lambda c: float(np.abs(c - last).sum()))
-    return result
-
-
-def _swing_twist_angles(q: Array) -> Array:
-    length = np.hypot(q[:, 2], q[:, 3])
-    known = length > 1e-9
-    safe = np.where(known, length, 1.0)
-    zero = np.zeros_like(length)
-    twist = np.stack(
-        [zero, zero, np.where(known, q[:, 2] / safe, 0), np.where(known, q[:, 3] / safe, 1)], -1
-    )
-    swing = rot.multiply(q, rot.conjugate(twist))
-    vector = np.degrees(rot.to_rotation_vector(swing))
-    angle = np.degrees(2.0 * np.arctan2(twist[:, 2], twist[:, 3]))
-    return _unwrapped(np.stack([vector[:, 0], vector[:, 1], angle], axis=-1))
-
-
-def _from_euler(radians: Array) -> Array:
-    axes = np.eye(3)
-    turns = [rot.from_axis_angle(axes[a], radians[:, a]) for a in (FLEXION, ABDUCTION, TWIST)]
-    return rot.multiply(rot.multiply(turns[0], turns[1]), turns[2])
-
-
-def _from_swing_twist(radians: Array) -> Array:
-    swing = np.hypot(radians[:, ABDUCTION], radians[:, FLEXION])
-    axis = np.stack([radians[:, ABDUCTION], radians[:, FLEXION], np.zeros_like(swing)], axis=-1)
-    axis /= np.maximum(swing, 1e-12)[:, None]
-    return rot.multiply(
-        rot.from_axis_angle(axis, swing), rot.from_axis_angle(np.eye(3)[TWIST], radians[:, TWIST])
-    )
-
-
-def _unwrapped(degrees: Array) -> Array:
-    """No jump by a turn, and the mean within half a turn of zero."""
-    continuous = np.unwrap(degrees, period=360.0, axis=0)
-    return np.asarray(continuous - 360.0 * np.round(continuous.mean(axis=0) / 360.0))
-
-
-def _letter_order(joint: str) -> list[int]:
-    """Axes of a joint in the order x, y, z of their letters."""
-    letters = THUMB_AXES if joint.startswith("Thumb") else FINGER_AXES
-    return [letters.index(letter) for letter in "xyz"]
-
-
-def _as_channels(frames: HandFrames, angles: Array) -> Channels:
-    columns = [angles[:, i, _letter_order(name)] for i, name in enumerate(frames.names)]
-    return Channels(all_channels(frames.side, frames.names), np.concatenate(columns, axis=1))
-
-
-def _from_channels(frames: HandFrames, values: Array) -> Array:
-    angles = np.empty((len(values), len(frames.names), 3))
-    for i, name in enumerate(frames.names):
-        angles[:, i, _letter_order(name)] = values[:, 3 * i : 3 * i + 3]
-    return angles
+def _letters(joint: str) -> list[int]:
+    """Where a joint's angles named x, y and z stand among abduction, flexion and twist."""
+    axes = THUMB_AXES if joint.startswith("Thumb") else FINGER_AXES
+    return [axes.index(letter) for letter in "xyz"]

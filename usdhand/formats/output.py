@@ -11,7 +11,9 @@ from pathlib import Path
 from usdhand.errors import OutputError
 
 
-def check_output(output: Path, inputs: Iterable[Path], force: bool, suffixes: Iterable[str]) -> None:
+def check_output(
+    output: Path, inputs: Iterable[Path], force: bool, suffixes: Iterable[str]
+) -> None:
     """Refuse an output before any work is done.
 
     Raises

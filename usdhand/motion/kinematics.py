@@ -61,7 +61,9 @@ def forward_kinematics(
         else:
             rotations[j] = rot.multiply(rotations[p], q)
             moved = (
-                np.einsum("tij,tj->ti", linear[p], t) if p in linear else rot.rotate(rotations[p], t)
+                np.einsum("tij,tj->ti", linear[p], t)
+                if p in linear
+                else rot.rotate(rotations[p], t)
             )
             positions[j] = positions[p] + moved
         if j in scaled or p in linear:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,23 +11,21 @@ from usdhand.errors import UsageError
 from usdhand.motion.clip import Clip
 from usdhand.motion.rotations import Array, slerp
 
+BLOCK = 256
+
 
 def interpolate(values: Array, frames: Array) -> Array:
     """Values (frames, ...) at fractional frame numbers, linearly, clamped to the ends."""
-    low, t = _split(frames, len(values))
-    high = np.minimum(low + 1, len(values) - 1)
-    t = t.reshape(-1, *([1] * (values.ndim - 1)))
-    return np.asarray(values[low] * (1.0 - t) + values[high] * t)
+
+    def between(low: Array, high: Array, t: Array) -> Array:
+        return low * (1.0 - t[..., None]) + high * t[..., None]
+
+    return _sampled(values, frames, between)
 
 
 def interpolate_rotations(rotations: Array, frames: Array) -> Array:
     """Quaternions (frames, ..., 4) at fractional frame numbers, spherically, clamped."""
-    low, t = _split(frames, len(rotations))
-    high = np.minimum(low + 1, len(rotations) - 1)
-    t = np.broadcast_to(
-        t.reshape(-1, *([1] * (rotations.ndim - 2))), (len(frames), *rotations.shape[1:-1])
-    )
-    return slerp(rotations[low], rotations[high], t)
+    return _sampled(rotations, frames, slerp)
 
 
 def resample(clip: Clip, fps: float) -> Clip:
@@ -58,7 +57,16 @@ def resample(clip: Clip, fps: float) -> Clip:
     )
 
 
-def _split(frames: Array, count: int) -> tuple[np.ndarray, Array]:  # type: ignore[type-arg]
-    frames = np.clip(np.asarray(frames, dtype=np.float64), 0.0, count - 1)
+def _sampled(
+    values: Array, frames: Array, between: Callable[[Array, Array, Array], Array]
+) -> Array:
+    """``between`` of the neighbours of each frame; block by block, to need little memory."""
+    frames = np.clip(np.asarray(frames, dtype=np.float64), 0.0, len(values) - 1)
     low = np.floor(frames).astype(np.intp)
-    return low, frames - low
+    high = np.minimum(low + 1, len(values) - 1)
+    t = (frames - low).reshape(-1, *([1] * (values.ndim - 2)))
+    result = np.empty((len(frames), *values.shape[1:]))
+    for start in range(0, len(frames), BLOCK):
+        rows = slice(start, start + BLOCK)
+        result[rows] = between(values[low[rows]], values[high[rows]], t[rows])
+    return result

@@ -1,6 +1,6 @@
 """Method 1, reduce: a hand rig of a few channels (Joerg & O'Sullivan 2009)."""
 
-from usdhand.reduce.errors import Errors, channel_differences, measure_errors, pca_rms
+from usdhand.reduce.errors import Errors, distances, measure_errors, pca_rms
 from usdhand.reduce.fit import PRESETS, Fit, Statistics, Thresholds, fit_relations
 from usdhand.reduce.method import Reduction, Target, apply_rig, expand, fit_rig
 from usdhand.reduce.rig import ReducedRig, Relation
@@ -17,7 +17,7 @@ __all__ = [
     "Target",
     "Thresholds",
     "apply_rig",
-    "channel_differences",
+    "distances",
     "expand",
     "fit_relations",
     "fit_rig",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -19,8 +20,14 @@ from usdhand.reduce.rig import Relation
 
 Fit = Literal["paper", "least-squares"]
 
-# A curve whose range is below this is constant whatever the threshold: it cannot be standardised.
-SMALLEST_RANGE_DEG = 1e-9
+# Two numbers that differ by less are the same: rounding errors must not decide who controls whom.
+# Degrees for ranges and (relative) standard deviations; a distance of standardised curves is a
+# square root and known less well near zero.
+SAME_DEG = 1e-9
+SAME_DISTANCE = 1e-7
+# A curve whose range is below this is constant whatever the threshold: what float32 leaves of a
+# joint that does not move cannot be standardised.
+SMALLEST_RANGE_DEG = 1e-6
 
 
 @dataclass(frozen=True)
@@ -59,45 +66,60 @@ class Statistics:
         correlation = np.clip(standard.T @ standard / len(curves), -1.0, 1.0)
         return cls(mean, std, np.ptp(curves, axis=0), correlation)
 
-    @property
+    @cached_property
     def distance(self) -> Array:
         """(n, n) the smaller of rmsd1 and rmsd2 of every pair."""
         return np.sqrt(2.0 * (1.0 - np.abs(self.correlation)))
 
     def moving(self, threshold: float) -> NDArray[np.bool_]:
-        """(n,) which curves are not replaced by their mean at this range threshold."""
-        return (self.range >= threshold) & (self.range > SMALLEST_RANGE_DEG)
+        """(n,) which curves are not replaced by their mean at this range threshold, degrees."""
+        return self.range > max(threshold - SAME_DEG, SMALLEST_RANGE_DEG)
 
-    def larger(self) -> NDArray[np.bool_]:
-        """(n, n) whether curve b (column) may control a (row).
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """(n,) channels by falling standard deviation, equal ones in channel order.
 
-        The one with the larger standard deviation controls; ties fall to the earlier channel.
+        A channel may control all those behind it.
         """
-        n = len(self.std)
-        earlier = np.arange(n)[None, :] < np.arange(n)[:, None]
-        return (self.std[None, :] > self.std[:, None]) | (
-            (self.std[None, :] == self.std[:, None]) & earlier
-        )
+        falling = np.argsort(-self.std, kind="stable")
+        std = self.std[falling]
+        step = std[1:] < std[:-1] * (1.0 - SAME_DEG)
+        level = np.concatenate([[0], np.cumsum(step)]) if len(std) else np.zeros(0)
+        order: NDArray[np.intp] = falling[np.lexsort((falling, level))]
+        return order
+
+    def sign(self, a: int, b: int) -> float:
+        """1 where rmsd1 of channels a and b is the smaller (or as small), -1 where rmsd2 is."""
+        return -1.0 if self.correlation[a, b] < -SAME_DEG else 1.0
 
 
 def controllers(statistics: Statistics, thresholds: Thresholds) -> NDArray[np.intp]:
-    """Controlling channel of each, followed to the root of its chain; -1 for none.
+    """Controlling channel of each, followed to the root of its chain; -1 for none, (n,).
 
     Of several controllers within the threshold the one with the largest standard deviation
     counts (section 5.2).
     """
-    moving = statistics.moving(thresholds.range)
-    candidate = statistics.larger() & (statistics.distance < thresholds.rmsd)
-    candidate &= moving[:, None] & moving[None, :]
-    # Largest standard deviation first, earlier channels first among equals.
-    order = np.lexsort((np.arange(len(moving)), -statistics.std))
-    first = np.argmax(candidate[:, order], axis=1)
-    direct = np.where(candidate.any(axis=1), order[first], -1)
-    root = direct.copy()
-    for a in order:  # a controller comes before what it controls
-        if direct[a] >= 0 and root[direct[a]] >= 0:
-            root[a] = root[direct[a]]
-    return root
+    return controllers_at(statistics, thresholds.range, np.array([thresholds.rmsd]))[0]
+
+
+def controllers_at(statistics: Statistics, range_deg: float, rmsds: Array) -> NDArray[np.intp]:
+    """Controllers at one range threshold and many ``rmsds`` (k,) at once; (k, n)."""
+    moving = statistics.moving(range_deg)
+    # In falling order of standard deviation the best controller is the first.
+    order = statistics.order[moving[statistics.order]]
+    n = len(order)
+    distance = np.where(
+        np.tri(n, k=-1, dtype=bool), statistics.distance[np.ix_(order, order)], np.inf
+    )
+    close = distance < rmsds[:, None, None] - SAME_DISTANCE
+    root = np.where(close.any(axis=2), close.argmax(axis=2), -1) if n else np.zeros((len(rmsds), 0))
+    rows = np.arange(len(rmsds))
+    for a in range(n):  # a controller comes before what it controls
+        above = np.where(root[:, a] >= 0, root[rows, root[:, a]], -1)
+        root[:, a] = np.where(above >= 0, above, root[:, a])
+    result = np.full((len(rmsds), len(moving)), -1, dtype=np.intp)
+    result[:, order] = np.where(root >= 0, order[root], -1) if n else -1
+    return result
 
 
 def fit_relations(
@@ -147,8 +169,10 @@ def _slopes(statistics: Statistics, a: int, chosen: list[int], fit: Fit) -> tupl
     std, correlation = statistics.std, statistics.correlation
     if fit == "paper":
         b = chosen[0]
-        sign = 1.0 if correlation[a, b] >= 0 else -1.0
-        return np.array([sign * std[a] / std[b]]), float(std[a] * statistics.distance[a, b])
+        # Standardised, the curves differ by the rmsd of that sign.
+        sign = statistics.sign(a, b)
+        error = std[a] * np.sqrt(max(0.0, 2.0 * (1.0 - sign * correlation[a, b])))
+        return np.array([sign * std[a] / std[b]]), float(error)
     among = correlation[np.ix_(chosen, chosen)]
     beta = np.linalg.lstsq(among, correlation[chosen, a], rcond=None)[0]
     explained = float(beta @ correlation[chosen, a])

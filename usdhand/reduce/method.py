@@ -10,7 +10,7 @@ import numpy as np
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
-from usdhand.reduce.errors import Errors, measure_errors
+from usdhand.reduce.errors import Errors, distances, measure_errors
 from usdhand.reduce.fit import Fit, Statistics, Thresholds, fit_relations
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.search import thresholds_for_count, thresholds_for_error
@@ -36,6 +36,7 @@ class Reduction:
 
     Attributes
     ----------
+    source : all channels of the clip
     free : curves of the rig's free channels
     reduced : all channels as the rig gives them, held ones included
     errors : of the modelled channels against the model (what reduction loses)
@@ -46,6 +47,7 @@ class Reduction:
     clip: Clip
     hands: Hands
     rig: ReducedRig
+    source: Channels
     free: Channels
     reduced: Channels
     errors: Errors
@@ -64,8 +66,13 @@ def fit_rig(
     target: Target,
     fit: Fit = "paper",
     most_controllers: int = 1,
+    sources: Sequence[Channels] | None = None,
 ) -> ReducedRig:
     """Fit one rig to all clips together (Joerg & O'Sullivan 2009).
+
+    Parameters
+    ----------
+    sources : all channels of the clips, if they were encoded already
 
     Raises
     ------
@@ -88,12 +95,12 @@ def fit_rig(
                 f"{clip.origin.path or clip.name} has other hand joints than {clips[0].name}: fit "
                 "them apart."
             )
-    encoded = [h.encode(c) for c, h in zip(clips, hands, strict=True)]
-    modelled = np.concatenate([e.select(names).values for e in encoded])
+    encoded = sources or [h.encode(c) for c, h in zip(clips, hands, strict=True)]
+    modelled = np.concatenate([e.select(names).values.T for e in encoded], axis=1).T
     statistics = Statistics.of(modelled)
     thresholds = _thresholds(statistics, target, fit)
     others = tuple(n for n in hands[0].all_names if n not in set(names))
-    held = np.concatenate([e.select(others).values for e in encoded]).mean(axis=0)
+    held = sum(e.select(others).values.sum(axis=0) for e in encoded) / len(modelled)
     return ReducedRig(
         fit_relations(names, statistics, thresholds, fit, most_controllers),
         dict(zip(others, (float(v) for v in held), strict=True)),
@@ -104,15 +111,21 @@ def fit_rig(
     )
 
 
-def apply_rig(rig: ReducedRig, clip: Clip, hands: Hands) -> Reduction:
+def apply_rig(
+    rig: ReducedRig, clip: Clip, hands: Hands, source: Channels | None = None
+) -> Reduction:
     """Express a clip, fitted or not, in the free channels of a rig.
+
+    Parameters
+    ----------
+    source : all channels of the clip, if they were encoded already
 
     Raises
     ------
     UsageError
         if the rig has channels that the clip's hands lack.
     """
-    source = hands.encode(clip)
+    source = source or hands.encode(clip)
     missing = sorted({*rig.names, *rig.held} - set(source.names))
     if missing:
         raise UsageError(
@@ -120,23 +133,21 @@ def apply_rig(rig: ReducedRig, clip: Clip, hands: Hands) -> Reduction:
             f"({len(missing)} such channels)."
         )
     free = source.select(rig.free)
-    reduced = rig.evaluate(free)
     # Channels of this hand that the rig knows nothing of keep their motion.
-    own = Channels(source.names, source.values.copy())
-    index = {name: i for i, name in enumerate(own.names)}
-    own.values[:, [index[name] for name in reduced.names]] = reduced.values
-    model = Channels(own.names, own.values.copy())
-    modelled = [index[name] for name in rig.names]
-    model.values[:, modelled] = source.values[:, modelled]
+    reduced = source.replaced(rig.evaluate(free))
+    model = reduced.replaced(source.select(rig.names))
+    tips, model_tips, reduced_tips = (hands.fingertips(clip, c) for c in (None, model, reduced))
+    total = measure_errors(source, reduced, distances(tips, reduced_tips))
     return Reduction(
         clip,
         hands,
         rig,
+        source,
         free,
-        own,
-        errors=measure_errors(model, own, rig.names, clip, hands),
-        model_errors=measure_errors(source, model, tuple(rig.held), clip, hands),
-        total_errors=measure_errors(source, own, source.names, clip, hands),
+        reduced,
+        errors=total.of_channels(rig.names, distances(model_tips, reduced_tips)),
+        model_errors=total.of_channels(tuple(rig.held), distances(tips, model_tips)),
+        total_errors=total,
     )
 
 
@@ -148,12 +159,11 @@ def expand(rig: ReducedRig, free: Channels, clip: Clip, hands: Hands) -> Clip:
     """
     channels = rig.evaluate(free)
     own = hands.encode(clip)
-    index = {name: i for i, name in enumerate(own.names)}
-    shared = [name for name in channels.names if name in index]
+    there = set(own.names)
+    shared = [name for name in channels.names if name in there]
     if not shared:
         raise UsageError(f"The rig and {clip.name} have no channel in common.")
-    own.values[:, [index[name] for name in shared]] = channels.select(shared).values
-    return hands.decode(own, clip)
+    return hands.decode(own.replaced(channels.select(shared)), clip)
 
 
 def _thresholds(statistics: Statistics, target: Target, fit: Fit) -> Thresholds:

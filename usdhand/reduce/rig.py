@@ -124,4 +124,4 @@ def evaluation_order(relations: Sequence[Relation]) -> tuple[Relation, ...]:
 
 
 def _columns(values: list[Array], frames: int) -> Array:
-    return np.stack(values, axis=1) if values else np.empty((frames, 0))
+    return np.stack(values).T if values else np.empty((frames, 0))

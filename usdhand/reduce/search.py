@@ -5,17 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from usdhand.errors import QualityError, UsageError
 from usdhand.motion.rotations import Array
-from usdhand.reduce.fit import Fit, Statistics, Thresholds, controllers
+from usdhand.reduce.fit import (
+    SAME_DEG,
+    SAME_DISTANCE,
+    Fit,
+    Statistics,
+    Thresholds,
+    controllers_at,
+)
 
 
 def thresholds_for_count(statistics: Statistics, count: int, fit: Fit = "paper") -> Thresholds:
     """Thresholds that leave ``count`` channels free with the smallest RMS error.
 
-    Every range threshold that makes a difference is tried, each with the smallest ``rmsd`` that
-    leaves no more than ``count``; where ties make ``count`` impossible, fewer stay free.
+    Every pair of thresholds that makes a difference is tried; where ties make ``count``
+    impossible, as many stay free as can be without exceeding it.
 
     Raises
     ------
@@ -26,16 +34,25 @@ def thresholds_for_count(statistics: Statistics, count: int, fit: Fit = "paper")
         raise UsageError(f"{count} free channels cannot be had: give 0 or more.")
     if count >= statistics.moving(0.0).sum():
         return Thresholds(0.0, 0.0)
-
-    def preference(thresholds: Thresholds) -> tuple[int, float, float]:
-        errors = channel_errors(statistics, thresholds, fit)
-        return (-_count(statistics, thresholds), float(np.sum(errors**2)), thresholds.range)
-
-    return min(_options(statistics, count), key=preference)
+    best: tuple[tuple[int, float, float], Thresholds] | None = None
+    for limit, rmsds, roots in _options(statistics):
+        free = _free(statistics, limit, roots)
+        allowed = np.flatnonzero((free <= count) & (free >= (-best[0][0] if best else 0)))
+        if len(allowed) == 0:
+            continue
+        squared = np.sum(_errors(statistics, limit, roots[allowed], fit) ** 2, axis=1)
+        i = np.lexsort((rmsds[allowed], squared, -free[allowed]))[0]
+        key = (-int(free[allowed[i]]), float(squared[i]), limit)
+        if best is None or key < best[0]:
+            best = key, Thresholds(limit, float(rmsds[allowed[i]]))
+    assert best is not None  # the largest range threshold leaves nothing free
+    return best[1]
 
 
 def thresholds_for_error(statistics: Statistics, most: float, fit: Fit = "paper") -> Thresholds:
     """Thresholds with the fewest free channels where no channel's RMS error exceeds ``most``.
+
+    Of several with equally few the one with the smallest RMS error over all channels.
 
     Raises
     ------
@@ -44,48 +61,52 @@ def thresholds_for_error(statistics: Statistics, most: float, fit: Fit = "paper"
     """
     if not most > 0:
         raise QualityError(f"An RMS error of at most {most:g} degrees cannot be met: give > 0.")
-    total = int(statistics.moving(0.0).sum())
-    for count in range(total):
-        fitting = [
-            t
-            for t in _options(statistics, count)
-            if channel_errors(statistics, t, fit).max(initial=0.0) <= most
-        ]
-        if fitting:
-            return min(
-                fitting,
-                key=lambda t: (float(np.sum(channel_errors(statistics, t, fit) ** 2)), t.range),
-            )
-    return Thresholds(0.0, 0.0)
+    best: tuple[tuple[int, float, float], Thresholds] | None = None
+    for limit, rmsds, roots in _options(statistics):
+        if statistics.std[~statistics.moving(limit)].max(initial=0.0) > most:
+            break  # a larger limit holds still more channels
+        errors = _errors(statistics, limit, roots, fit)
+        allowed = np.flatnonzero(errors.max(axis=1, initial=0.0) <= most)
+        free = _free(statistics, limit, roots)[allowed]
+        squared = np.sum(errors[allowed] ** 2, axis=1)
+        i = np.lexsort((rmsds[allowed], squared, free))[0]  # no relation at all is always allowed
+        key = (int(free[i]), float(squared[i]), limit)
+        if best is None or key < best[0]:
+            best = key, Thresholds(limit, float(rmsds[allowed[i]]))
+    return best[1] if best else Thresholds(0.0, 0.0)
 
 
 def channel_errors(statistics: Statistics, thresholds: Thresholds, fit: Fit) -> Array:
     """(n,) RMS error in degrees of every channel, without making a single curve."""
-    root = controllers(statistics, thresholds)
-    rows = np.arange(len(root))
-    r = np.abs(statistics.correlation[rows, root])
-    linear = np.sqrt(2.0 * (1.0 - r)) if fit == "paper" else np.sqrt(1.0 - r**2)
-    errors = np.where(root >= 0, statistics.std * linear, 0.0)
-    return np.where(statistics.moving(thresholds.range), errors, statistics.std)
+    roots = controllers_at(statistics, thresholds.range, np.array([thresholds.rmsd]))
+    return np.asarray(_errors(statistics, thresholds.range, roots, fit)[0])
 
 
-def _options(statistics: Statistics, count: int) -> Iterator[Thresholds]:
-    larger, distance = statistics.larger(), statistics.distance
-    for limit in (0.0, *np.unique(statistics.range[statistics.range > 0])):
-        limit = float(np.nextafter(limit, np.inf)) if limit else 0.0
+def _options(statistics: Statistics) -> Iterator[tuple[float, Array, NDArray[np.intp]]]:
+    """All that thresholds can do: a range threshold, all rmsds (k,), controllers (k, n) at each."""
+    for limit in (0.0, *(_distinct(statistics.range, SAME_DEG) + 2 * SAME_DEG)):
         moving = statistics.moving(limit)
-        if moving.sum() < count:
-            break
-        # A channel stops being free once the threshold passes its nearest possible controller.
-        reachable = np.where(larger & moving[None, :], distance, np.inf)
-        nearest = np.sort(reachable.min(axis=1, initial=np.inf)[moving])
-        dependent = int(moving.sum()) - count
-        if dependent == 0:
-            yield Thresholds(limit, 0.0)
-        elif np.isfinite(nearest[dependent - 1]):
-            yield Thresholds(limit, float(np.nextafter(nearest[dependent - 1], np.inf)))
+        pairs = np.triu(moving[:, None] & moving[None, :], k=1)
+        rmsds = _distinct(statistics.distance[pairs], SAME_DISTANCE) + 2 * SAME_DISTANCE
+        rmsds = np.concatenate([[0.0], rmsds])
+        yield float(limit), rmsds, controllers_at(statistics, float(limit), rmsds)
 
 
-def _count(statistics: Statistics, thresholds: Thresholds) -> int:
-    moving = statistics.moving(thresholds.range)
-    return int((moving & (controllers(statistics, thresholds) < 0)).sum())
+def _distinct(values: Array, same: float) -> Array:
+    """Values in rising order, one of every run that differs by no more than rounding errors."""
+    values = np.sort(values)
+    last = np.append(np.diff(values) > same, True)[: len(values)]
+    return np.asarray(values[last])
+
+
+def _errors(statistics: Statistics, limit: float, roots: NDArray[np.intp], fit: Fit) -> Array:
+    """(k, n) RMS errors in degrees of all channels under controllers (k, n)."""
+    r = np.abs(statistics.correlation[np.arange(roots.shape[1]), roots])
+    linear = np.sqrt(2.0 * (1.0 - r)) if fit == "paper" else np.sqrt(1.0 - r**2)
+    errors = np.where(roots >= 0, statistics.std * linear, 0.0)
+    return np.where(statistics.moving(limit), errors, statistics.std)
+
+
+def _free(statistics: Statistics, limit: float, roots: NDArray[np.intp]) -> NDArray[np.intp]:
+    """(k,) number of free channels under controllers (k, n)."""
+    return np.asarray(np.sum(statistics.moving(limit) & (roots < 0), axis=1))

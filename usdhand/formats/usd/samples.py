@@ -1,4 +1,4 @@
-"""Time samples of array attributes, read as fast as USD allows.
+"""Array attributes over time, read as fast as USD allows.
 
 Reading from the layer that holds the samples is about 1.5 times faster than asking the attribute;
 where the samples are composed in any less simple way, the attribute is asked.
@@ -6,8 +6,9 @@ where the samples are composed in any less simple way, the attribute is asked.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,99 +18,109 @@ from pxr import Sdf, Usd
 from usdhand.errors import InputError
 from usdhand.motion.rotations import Array
 
+BLOCK = 128  # rows worked on at a time: they stay in the processor's cache
+EVERY = slice(None)
+
+Places = NDArray[np.intp] | slice
+
 
 @dataclass(frozen=True, eq=False)
-class Samples:
-    """Values of an attribute at its own sample times (stage time codes, ascending).
+class Track:
+    """An array attribute at some time codes: a row each, or one row if it has a value only.
 
-    An attribute without time samples but with a value has one entry and no times.
-    """
-
-    times: Array
-    values: Array
-
-
-def read_samples(
-    attribute: Usd.Attribute, width: int, target: NDArray[np.intp], template: Array
-) -> Samples | None:
-    """All samples of an array attribute, its elements put where ``target`` says.
-
-    Parameters
+    Attributes
     ----------
-    width : numbers an element (4 for quaternions, 3 for vectors)
-    target : (elements,) place of each element in the result, -1 for none
-    template : (joints, width) values of places that no element goes to
-
-    Returns
-    -------
-    Samples with values (samples, joints, width) in float64, or None if nothing is authored.
-
-    Raises
-    ------
-    InputError
-        if a sample is blocked, or has another number of elements than ``target``.
+    times : stage time codes; empty for an attribute without time samples
+    keys : what ``get`` takes for each row
+    shape : of a row, (elements, numbers an element)
     """
+
+    attribute: Usd.Attribute
+    times: Array
+    keys: list[Any]
+    get: Callable[[Any], Any]
+    shape: tuple[int, int]
+
+    @property
+    def still(self) -> bool:
+        """Whether there is one value and no time samples."""
+        return not len(self.times)
+
+    def at(self, times: Array) -> Track:
+        """The same attribute at other times, as USD interpolates it."""
+        if self.still or _same(times, self.times):
+            return self
+        query = Usd.AttributeQuery(self.attribute)
+        return Track(self.attribute, times, times.tolist(), query.Get, self.shape)
+
+    def fill(self, rows: NDArray[Any], start: int, elements: Places, places: Places) -> None:
+        """Put values from row ``start`` on into ``rows``: their ``elements`` to ``places``.
+
+        Raises
+        ------
+        InputError
+            if a sample is blocked or has another number of elements than the track.
+        """
+        get, shape, whole = self.get, self.shape, elements is EVERY
+        found = rows if whole else np.empty((len(rows), *shape), rows.dtype)
+        keys = self.keys * len(rows) if self.still else self.keys[start : start + len(rows)]
+        for i, key in enumerate(keys):
+            row = np.asarray(get(key))
+            if row.shape != shape:
+                raise InputError(self._refusal(row, start + i))
+            found[i] = row
+        if not whole:
+            rows[:, places] = found[:, elements]
+
+    @property
+    def where(self) -> str:
+        """File of the stage, for messages."""
+        return str(self.attribute.GetStage().GetRootLayer().realPath)
+
+    def _refusal(self, row: NDArray[Any], index: int) -> str:
+        at = f"at time code {self.times[index]:g}" if len(self.times) else "and no time samples"
+        size = f"{len(row)} elements" if row.ndim else "no value"
+        return (
+            f"{self.where}: {self.attribute.GetPath()} has {size} {at}, but its animation lists "
+            f"{self.shape[0]} joints. Export the animation again."
+        )
+
+
+def open_track(attribute: Usd.Attribute, shape: tuple[int, int]) -> Track | None:
+    """Open an attribute at its own samples; None if nothing is authored."""
     if not attribute or not attribute.HasAuthoredValue():
         return None
-    times = attribute.GetTimeSamples()
-    get = _getter(attribute, times)
-    count = max(len(times), 1)
-    values = np.empty((count, *template.shape))
-    keep = np.flatnonzero(target >= 0)
-    place = target[keep]
-    if (
-        len(place) == len(template)
-        and np.array_equal(place, np.arange(len(template)))
-        and len(keep) == len(target)
-    ):
-        for i in range(count):
-            values[i] = _elements(get(i), attribute, times, i, len(target), width)
-    else:
-        values[:] = template
-        for i in range(count):
-            values[i, place] = _elements(get(i), attribute, times, i, len(target), width)[keep]
-    return Samples(np.array(times, dtype=np.float64), values)
+    source = attribute.GetResolveInfo(Usd.TimeCode.EarliestTime()).GetSource()
+    if source == Usd.ResolveInfoSourceTimeSamples:
+        layer, path, keys, times = _layer_samples(attribute)
+        return Track(attribute, times, keys, partial(layer.QueryTimeSample, path), shape)
+    keys = attribute.GetTimeSamples()
+    if keys:
+        return Track(attribute, np.array(keys), keys, Usd.AttributeQuery(attribute).Get, shape)
+    return Track(attribute, np.empty(0), [None], lambda _: attribute.Get(), shape)
 
 
-def _elements(
-    value: Any, attribute: Usd.Attribute, times: list[float], index: int, count: int, width: int
-) -> NDArray[Any]:
-    if value is None or len(value) != count:
-        at = f"at time code {times[index]:g}" if times else "as default"
-        size = "no value (it is blocked)" if value is None else f"{len(value)} elements"
-        raise InputError(
-            f"{attribute.GetStage().GetRootLayer().realPath}: {attribute.GetPath()} has {size} {at}, "
-            f"but its animation lists {count} joints. Export the animation again."
-        )
-    return np.asarray(value).reshape(count, width)
+def blocks(count: int) -> Iterator[slice]:
+    """Slices that together cover ``count`` rows."""
+    return (slice(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK))
 
 
-def _getter(attribute: Usd.Attribute, times: list[float]) -> Callable[[int], Any]:
-    if not times:
-        value = attribute.Get()
-        return lambda _: value
-    direct = _layer_samples(attribute, times)
-    if direct is not None:
-        layer, path, layer_times = direct
-        return lambda i: layer.QueryTimeSample(path, layer_times[i])
-    query = Usd.AttributeQuery(attribute)
-    return lambda i: query.Get(times[i])
+def steady(values: NDArray[Any]) -> bool:
+    """Whether all rows are the same."""
+    if len(values) < 2 or values.strides[0] == 0:
+        return True
+    return all(bool((values[block] == values[0]).all()) for block in blocks(len(values)))
 
 
-def _layer_samples(
-    attribute: Usd.Attribute, times: list[float]
-) -> tuple[Sdf.Layer, Sdf.Path, list[float]] | None:
-    """Return the layer that alone supplies the samples, or None where it is less simple."""
-    if attribute.GetResolveInfo(times[0]).GetSource() != Usd.ResolveInfoSourceTimeSamples:
-        return None
-    for spec, offset in attribute.GetPropertyStackWithLayerOffsets(Usd.TimeCode(times[0])):
-        layer_times = spec.layer.ListTimeSamplesForPath(spec.path)
-        if not layer_times:
-            continue
-        if len(layer_times) != len(times):
-            return None
-        in_stage = np.array(layer_times) * offset.scale + offset.offset
-        if not np.allclose(in_stage, times, rtol=0.0, atol=1e-6):
-            return None
-        return spec.layer, spec.path, layer_times
-    return None
+def _same(times: Array, own: Array) -> bool:
+    return len(times) == len(own) and np.allclose(times, own, rtol=1e-12, atol=1e-6)
+
+
+def _layer_samples(attribute: Usd.Attribute) -> tuple[Sdf.Layer, Sdf.Path, list[float], Array]:
+    """Return the strongest layer with samples, its time codes, and what they are on the stage."""
+    specs = attribute.GetPropertyStackWithLayerOffsets(Usd.TimeCode.EarliestTime())
+    for spec, offset in specs:
+        keys = spec.layer.ListTimeSamplesForPath(spec.path)
+        if keys:
+            return spec.layer, spec.path, keys, np.array(keys) * offset.scale + offset.offset
+    raise AssertionError(f"{attribute.GetPath()} resolves to time samples, but has none")

@@ -8,7 +8,6 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from usdhand.errors import InputError
-from usdhand.formats.usd.stage import Character
 from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
 
@@ -30,19 +29,21 @@ class World:
     axes: Array
 
 
-def world_above(character: Character, times: Array | None = None) -> World:
-    """Return the transform above a skeleton, at each of ``times`` if something above moves."""
-    stage, prim = character.stage, character.skeleton
-    moving = times is not None and _moves(prim)
-    codes = [Usd.TimeCode(t) for t in times] if moving and times is not None else [_earliest(times)]
-    cache = UsdGeom.XformCache()
-    matrices = np.empty((len(codes), 4, 4))
-    for i, code in enumerate(codes):
-        cache.SetTime(code)
-        matrices[i] = np.array(cache.GetLocalToWorldTransform(prim)).T
+def world_above(skeleton: Usd.Prim, times: Array | None = None) -> World:
+    """Return the transform above a skeleton, at each of ``times`` if something above moves.
+
+    Raises
+    ------
+    InputError
+        if it is no transform that could be undone.
+    """
+    stage = skeleton.GetStage()
+    matrices = _matrices(skeleton, times)
     u, singular, vt = np.linalg.svd(matrices[:, :3, :3])
-    if not np.isfinite(singular).all() or singular.min() < 1e-12:
-        raise InputError(f"{character.path}: {prim.GetPath()} stands under a zero scale.")
+    if singular.min() < 1e-12:
+        raise InputError(
+            f"{stage.GetRootLayer().realPath}: {skeleton.GetPath()} stands under a zero scale."
+        )
     u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
     axes = Y_UP_FROM_Z_UP if str(UsdGeom.GetStageUpAxis(stage)) == "Z" else np.eye(3)
     cm = 100.0 * UsdGeom.GetStageMetersPerUnit(stage)
@@ -54,26 +55,47 @@ def world_above(character: Character, times: Array | None = None) -> World:
     )
 
 
-def world_problems(skeleton: Usd.Prim) -> tuple[Problem, ...]:
+def world_problems(skeleton: Usd.Prim, times: Array | None = None) -> tuple[Problem, ...]:
     """Return what a clip cannot represent of the transforms above a skeleton."""
-    matrix = UsdGeom.XformCache().GetLocalToWorldTransform(skeleton)
-    linear = np.array(matrix)[:3, :3]
+    linear = _matrices(skeleton, times)[:, :3, :3]
     singular = np.linalg.svd(linear, compute_uv=False)
+    largest, smallest = singular.max(axis=1), singular.min(axis=1)
+    uneven = UNIFORM_SCALE_TOLERANCE * smallest
+    found = {
+        "non-uniform-scale": (
+            (largest > smallest + uneven).any(),
+            "a non-uniform scale stands above the skeleton: bones are read with its mean",
+        ),
+        "mirrored": (
+            (np.linalg.det(linear) < 0).any(),
+            "a mirroring stands above the skeleton: sides may swap",
+        ),
+        "animated-scale": (
+            (np.abs(smallest - smallest[0]) > uneven[0]).any(),
+            "the scale above the skeleton changes over time: that of the first frame is read",
+        ),
+    }
     where = str(skeleton.GetPath())
-    problems = []
-    if singular.max() > singular.min() * (1.0 + UNIFORM_SCALE_TOLERANCE):
-        problems.append(
-            Problem("non-uniform-scale", "a non-uniform scale stands above the skeleton", where)
-        )
-    if np.linalg.det(linear) < 0:
-        problems.append(
-            Problem("mirrored", "a mirroring stands above the skeleton: sides may swap", where)
-        )
-    return tuple(problems)
+    return tuple(Problem(code, text, where) for code, (there, text) in found.items() if there)
 
 
-def _earliest(times: Array | None) -> Usd.TimeCode:
-    return Usd.TimeCode.EarliestTime() if times is None else Usd.TimeCode(times[0])
+def _matrices(prim: Usd.Prim, times: Array | None) -> Array:
+    """Local-to-world matrices (n, 4, 4) for column vectors; one where nothing above moves."""
+    if times is None:
+        codes = [Usd.TimeCode.EarliestTime()]
+    else:
+        codes = [Usd.TimeCode(time) for time in (times if _moves(prim) else times[:1])]
+    cache = UsdGeom.XformCache()
+    matrices = np.empty((len(codes), 4, 4))
+    for i, code in enumerate(codes):
+        cache.SetTime(code)
+        matrices[i] = np.array(cache.GetLocalToWorldTransform(prim)).T
+    if not np.isfinite(matrices).all():
+        raise InputError(
+            f"{prim.GetStage().GetRootLayer().realPath}: not-a-number in the transforms above "
+            f"{prim.GetPath()}."
+        )
+    return matrices
 
 
 def _moves(prim: Usd.Prim) -> bool:

@@ -4,69 +4,35 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils, Vt
+from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
-from usdhand.errors import InputError, OutputError, UsdHandError
+from usdhand.errors import OutputError, UsdHandError
 from usdhand.formats.output import check_output, written_beside
-from usdhand.formats.usd.read import read_file_motion
+from usdhand.formats.usd.animation import author_animation
 from usdhand.formats.usd.stage import (
     USD_SUFFIXES,
     Character,
     binding_prim,
-    bound_animation,
     open_stage,
 )
-from usdhand.formats.usd.world import world_above
 from usdhand.motion import Clip
-from usdhand.motion import rotations as rot
 
 ANIMATION_NAME = "HandMotion"
 # Fields of a root layer that are about the layer itself; all others describe the stage.
-LAYER_FIELDS = {"subLayers", "subLayerOffsets", "primChildren", "comment", "documentation", "owner"}
-
-
-@dataclass(frozen=True, eq=False)
-class AnimationArrays:
-    """Values of a SkelAnimation in the file's own units: a row a frame, or one row for all."""
-
-    joints: tuple[str, ...]
-    times: NDArray[np.float64]
-    rotations: NDArray[np.float32]
-    translations: NDArray[np.float32]
-    scales: NDArray[np.float16]
-
-
-def animation_arrays(character: Character, clip: Clip, changed: Sequence[int]) -> AnimationArrays:
-    """Arrays of a clip's motion in the file's units.
-
-    Joints other than ``changed`` keep the file's values to the bit where it has these frames.
-    """
-    skeleton = clip.skeleton
-    roots = np.flatnonzero(skeleton.parents < 0)
-    world = world_above(character, clip.time_codes)
-    above = rot.conjugate(rot.from_matrix(world.rotation))[:, None]
-    rotations = clip.rotations.astype(np.float32)
-    translations = (clip.translations / world.scale).astype(np.float32)
-    rotations[:, roots] = rot.multiply(above, clip.rotations[:, roots])
-    placed = clip.translations[:, roots] - world.translation[:, None]
-    translations[:, roots] = rot.rotate(above, placed) / world.scale
-    scales = clip.scales.astype(np.float16)
-    if character.animation is not None:
-        motion = read_file_motion(character)
-        if np.array_equal(motion.times, clip.time_codes):
-            kept = np.setdiff1d(np.arange(len(skeleton)), changed)
-            rotations[:, kept] = motion.rotations[:, kept]
-            translations[:] = motion.translations
-            scales[:] = motion.scales
-    return AnimationArrays(
-        skeleton.joints, clip.time_codes, rotations, _collapsed(translations), _collapsed(scales)
-    )
+LAYER_FIELDS = {
+    "comment",
+    "documentation",
+    "hasOwnedSubLayers",
+    "layerRelocates",
+    "owner",
+    "primChildren",
+    "subLayerOffsets",
+    "subLayers",
+}
 
 
 def write_motion(
@@ -101,10 +67,11 @@ def write_motion(
             Sdf.CreatePrimInLayer(layer, path).SetInfo("instanceable", False)
         root = character.root.GetPath()
         animation = _free_child(character.stage, root, ANIMATION_NAME)
-        arrays = animation_arrays(character, clip, changed)
-        _author_animation(layer, animation, arrays, character.animation)
+        times = author_animation(layer, animation, character, clip, changed)
+        if character.animation is not None:
+            _copy_blend_shapes(layer, animation, UsdSkel.Animation(character.animation))
         _bind(layer, character, animation)
-        _extend_time(layer, arrays.times)
+        _extend_time(layer, times)
         if author is not None:
             author(layer, root)
     save_layer(layer, output, flatten=flatten)
@@ -152,13 +119,15 @@ def _export(layer: Sdf.Layer, path: Path) -> None:
 
 
 def _verify(path: Path) -> None:
+    """Open what was written. What the input lacks is the input's, but it must be found."""
     try:
-        stage, problems = open_stage(path)
+        stage, _ = open_stage(path)
     except UsdHandError as error:
         raise OutputError(f"What was written cannot be read back: {error}") from error
-    if problems:
-        raise OutputError(f"What was written does not hold together: {problems[0]}.")
-    del stage
+    layer = stage.GetRootLayer()
+    for asset in layer.subLayerPaths:
+        if not Sdf.Layer.FindOrOpenRelativeToLayer(layer, asset):
+            raise OutputError(f"{asset} cannot be found from {path.parent}.")
 
 
 def _layer_over(stage: Usd.Stage, output: Path) -> Sdf.Layer:
@@ -204,37 +173,8 @@ def _free_child(stage: Usd.Stage, parent: Sdf.Path, name: str) -> Sdf.Path:
     return path
 
 
-def _author_animation(
-    layer: Sdf.Layer, path: Sdf.Path, arrays: AnimationArrays, source: Usd.Prim | None
-) -> None:
-    prim = Sdf.CreatePrimInLayer(layer, path)
-    prim.specifier = Sdf.SpecifierDef
-    prim.typeName = "SkelAnimation"
-    joints = Sdf.AttributeSpec(
-        prim, "joints", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform
-    )
-    joints.default = Vt.TokenArray(list(arrays.joints))
-    for name, type_name, values, convert in (
-        ("rotations", Sdf.ValueTypeNames.QuatfArray, arrays.rotations, Vt.QuatfArray.FromNumpy),
-        (
-            "translations",
-            Sdf.ValueTypeNames.Float3Array,
-            arrays.translations,
-            Vt.Vec3fArray.FromNumpy,
-        ),
-        ("scales", Sdf.ValueTypeNames.Half3Array, arrays.scales, Vt.Vec3hArray.FromNumpy),
-    ):
-        attribute = Sdf.AttributeSpec(prim, name, type_name)
-        if len(values) == 1 and name != "rotations":  # Blender wants samples of rotations
-            attribute.default = convert(np.ascontiguousarray(values[0]))
-            continue
-        for time, row in zip(arrays.times, values, strict=True):
-            layer.SetTimeSample(attribute.path, float(time), convert(np.ascontiguousarray(row)))
-    if source is not None:
-        _copy_blend_shapes(layer, prim, UsdSkel.Animation(source))
-
-
-def _copy_blend_shapes(layer: Sdf.Layer, prim: Sdf.PrimSpec, source: UsdSkel.Animation) -> None:
+def _copy_blend_shapes(layer: Sdf.Layer, path: Sdf.Path, source: UsdSkel.Animation) -> None:
+    prim = layer.GetPrimAtPath(path)
     for attribute, variability in (
         (source.GetBlendShapesAttr(), Sdf.VariabilityUniform),
         (source.GetBlendShapeWeightsAttr(), Sdf.VariabilityVarying),
@@ -265,19 +205,3 @@ def _extend_time(layer: Sdf.Layer, times: NDArray[np.float64]) -> None:
         layer.startTimeCode = float(times[0])
     if not layer.HasEndTimeCode() or layer.endTimeCode < times[-1]:
         layer.endTimeCode = float(times[-1])
-
-
-def _collapsed(values: NDArray[Any]) -> NDArray[Any]:
-    """One row where all rows are the same."""
-    return values[:1] if (values == values[:1]).all() else values
-
-
-__all__ = [
-    "ANIMATION_NAME",
-    "AnimationArrays",
-    "animation_arrays",
-    "bound_animation",
-    "save_layer",
-    "stage_files",
-    "write_motion",
-]

@@ -1,0 +1,19 @@
+"""What all tests share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+SHARED = Path(os.environ.get("USDHAND_SHARED", REPOSITORY.parent / "shared"))
+
+
+def shared_data(*parts: str) -> Path:
+    """A file or folder of the project's shared data; skips the test where there is none."""
+    path = SHARED.joinpath("data", *parts)
+    if not path.exists():
+        pytest.skip(f"no real data at {path}: set USDHAND_SHARED to the shared folder")
+    return path
