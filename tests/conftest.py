@@ -6,9 +6,14 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("USDHAND_SHARED", REPOSITORY.parent / "shared"))
+
+# The same examples in every run: a failure can be made again. Machines differ in speed.
+settings.register_profile("usdhand", deadline=None, derandomize=True)
+settings.load_profile("usdhand")
 
 
 def shared_data(*parts: str) -> Path:

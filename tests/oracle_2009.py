@@ -46,7 +46,9 @@ def rmsd2(a: Curve, b: Curve) -> float:
     return math.sqrt(math.fsum((x + y) ** 2 for x, y in zip(a, b, strict=True)) / len(a))
 
 
-def simplify(curves: dict[str, Curve], range_limit: float, rmsd_limit: float) -> dict[str, Simplified]:
+def simplify(
+    curves: dict[str, Curve], range_limit: float, rmsd_limit: float
+) -> dict[str, Simplified]:
     """Steps 1 and 2, or 3 and 4, of the paper; curves in degrees, in channel order."""
     result: dict[str, Simplified] = {}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -194,6 +195,11 @@ def edited(path: Path) -> Usd.Stage:
     return Usd.Stage.Open(str(path))
 
 
+def relative(asset: Path, path: Path) -> str:
+    """Where an asset is from a layer."""
+    return "./" + Path(os.path.relpath(asset, path.parent)).as_posix()
+
+
 def referencing(
     path: Path,
     asset: Path,
@@ -210,7 +216,7 @@ def referencing(
     holder = stage.DefinePrim(prim)
     arcs = holder.GetReferences() if how == "reference" else holder.GetPayloads()
     arc = Sdf.Reference if how == "reference" else Sdf.Payload
-    item = arc(f"./{asset.name}", layerOffset=offset or Sdf.LayerOffset())
+    item = arc(relative(asset, path), layerOffset=offset or Sdf.LayerOffset())
     (arcs.AddReference if how == "reference" else arcs.AddPayload)(item)
     if instanceable:
         holder.SetInstanceable(True)
@@ -223,7 +229,7 @@ def sublayering(
 ) -> Path:
     """A layer over others, the strongest first."""
     made = layer(path, **metadata)
-    made.subLayerPaths[:] = [f"./{asset.name}" for asset in assets]
+    made.subLayerPaths[:] = [relative(asset, path) for asset in assets]
     if offset is not None:
         for i in range(len(assets)):
             made.subLayerOffsets[i] = offset

@@ -111,7 +111,9 @@ WRONG: dict[str, tuple[Make, str, str, str]] = {
     "hyphen": (joints_named("hand-L"), "error", "illegal-joint-name", "'hand_L'"),
     "dot": (joints_named("hand.L"), "error", "illegal-joint-name", "'hand_L'"),
     "digit": (joints_named("1hand"), "error", "illegal-joint-name", "'_1hand'"),
-    "same leaf": (joints_named("a", "a/end", "b", "b/end"), "warning", "duplicate-joint-name", "end"),
+    "same leaf": (
+        joints_named("a", "a/end", "b", "b/end"), "warning", "duplicate-joint-name", "end",
+    ),
     "twice": (joints_named("a", "a"), "error", "duplicate-joint", "Hips/a"),
     "order": (joints_named("a/b", "a"), "error", "joint-order", "Hips/a/b"),
     "no joints": (character(joints=[]), "error", "no-joints", "no joints"),
@@ -125,8 +127,12 @@ WRONG: dict[str, tuple[Make, str, str, str]] = {
         changed(pose("rest", stages.rest_matrices(stages.JOINTS)[:3])),
         "error", "rest-length", "3 rest transforms for 11 joints",
     ),
-    "singular bind": (changed(pose("bind", np.zeros((11, 4, 4)))), "error", "bad-bind", "11 bind"),
-    "nan rest": (changed(pose("rest", np.full((11, 4, 4), np.nan))), "error", "bad-rest", "11 rest"),
+    "singular bind": (
+        changed(pose("bind", np.zeros((11, 4, 4)))), "error", "bad-bind", "11 bind",
+    ),
+    "nan rest": (
+        changed(pose("rest", np.full((11, 4, 4), np.nan))), "error", "bad-rest", "11 rest",
+    ),
     "no scales": (character(without=["scales"]), "error", "missing-scales", "rest pose"),
     "no translations": (
         character(without=["translations"]), "error", "missing-translations", "rest pose",
@@ -146,7 +152,9 @@ WRONG: dict[str, tuple[Make, str, str, str]] = {
     ),
     "lost binding": (changed(second_animation), "warning", "lost-binding", "/Hero/Other"),
     "static": (character(rotations=waves()[:1]), "warning", "static-rotations", "Blender"),
-    "array length": (changed(short_row), "error", "array-length", "4 values for 11 joints at time code 5"),
+    "array length": (
+        changed(short_row), "error", "array-length", "4 values for 11 joints at time code 5",
+    ),
     "blocked": (
         changed(lambda s: animation(s).GetTranslationsAttr().Set(Sdf.ValueBlock(), 4.0),
                 translations=np.tile(stages.offsets(11), (12, 1, 1))),
@@ -158,7 +166,9 @@ WRONG: dict[str, tuple[Make, str, str, str]] = {
         "error", "not-a-number", "the default value",
     ),
     "zero": (character(rotations=waves(0.0)), "error", "zero-quaternion", "Head at time code 4"),
-    "long": (character(rotations=waves(1.2)), "error", "non-unit-quaternion", "Head at time code 4"),
+    "long": (
+        character(rotations=waves(1.2)), "error", "non-unit-quaternion", "Head at time code 4",
+    ),
     "sign flip": (
         character(rotations=waves(-1.0)), "warning", "sign-flip", "Head at time code 4 and 1 more",
     ),
@@ -174,9 +184,16 @@ WRONG: dict[str, tuple[Make, str, str, str]] = {
     "lost reference": (lost("reference"), "error", UNRESOLVED, "nowhere.usda"),
     "lost payload": (lost("payload"), "error", UNRESOLVED, "nowhere.usda"),
     "no up axis": (character(up=None), "warning", f"{METADATA}UpAxisMetadata", "upAxis"),
-    "no unit": (character(meters=None), "warning", f"{METADATA}MetersPerUnitMetadata", "metersPerUnit"),
+    "no unit": (
+        character(meters=None), "warning", f"{METADATA}MetersPerUnitMetadata", "metersPerUnit",
+    ),
+    "zero scale": (
+        changed(lambda s: stages.place(s, scale=(0, 0, 0)) and None),
+        "error", "zero-scale", "zero scale",
+    ),
     "mirrored": (
-        changed(lambda s: stages.place(s, scale=(-1, 1, 1)) and None), "warning", "mirrored", "sides",
+        changed(lambda s: stages.place(s, scale=(-1, 1, 1)) and None),
+        "warning", "mirrored", "sides",
     ),
     "non-uniform": (
         changed(lambda s: stages.place(s, scale=(1, 2, 1)) and None),

@@ -154,7 +154,9 @@ def evaluated(relations: tuple[Relation, ...], curves: Array) -> Array:
 
 
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize(("fit", "most"), [("paper", 1), ("least-squares", 1), ("least-squares", 3)])
+@pytest.mark.parametrize(
+    ("fit", "most"), [("paper", 1), ("least-squares", 1), ("least-squares", 3)]
+)
 def test_errors_are_those_of_the_curves(seed: int, fit: str, most: int) -> None:
     curves = random_curves(seed)
     relations = fit_relations(
@@ -215,4 +217,6 @@ def test_no_curves_at_all() -> None:
 def test_a_rig_that_contradicts_itself_is_refused() -> None:
     free = Channels(("a",), np.zeros((4, 1)))
     with pytest.raises(InputError, match="'b' follows 'x'"):
-        ReducedRig((Relation("a", "free"), Relation("b", "linear", controllers=("x",), slopes=(1.0,)))).evaluate(free)
+        ReducedRig(
+            (Relation("a", "free"), Relation("b", "linear", controllers=("x",), slopes=(1.0,)))
+        ).evaluate(free)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
+import oracle_2009
 import pytest
 from numpy.testing import assert_allclose
 
@@ -188,9 +189,9 @@ def test_table_5_free_channels(preset: int, free: int) -> None:
     assert len(kinds(preset)["free"]) == free
 
 
-@pytest.mark.parametrize(("preset", "tables"), [(1, [TABLE_1]), (2, [TABLE_1])])
-def test_table_1_constants(preset: int, tables: list[dict[str, tuple[float, float]]]) -> None:
-    check_constants(preset, tables)
+@pytest.mark.parametrize("preset", [1, 2])
+def test_table_1_constants(preset: int) -> None:
+    check_constants(preset, [TABLE_1])
 
 
 @pytest.mark.parametrize("preset", [3, 4])
@@ -256,6 +257,18 @@ def test_section_6_what_is_left() -> None:
     assert max(right, key=lambda n: right[n]) == "riPinkyMCPy"
 
 
+@pytest.mark.parametrize("preset", [2, 4])
+def test_the_oracle_says_the_same(preset: int) -> None:
+    curves = {n: list(map(float, c)) for n, c in zip(NAMES, papers_curves().T, strict=True)}
+    limits = PRESETS[preset]
+    for name, rule in oracle_2009.simplify(curves, limits.range, limits.rmsd).items():
+        relation = relations(preset)[name]
+        assert relation.kind == rule.kind
+        assert relation.controllers == ((rule.controller,) if rule.controller else ())
+        if rule.kind == "linear":
+            assert relation.slopes[0] == pytest.approx(rule.slope)
+
+
 def test_a_target_of_15_channels_is_met_exactly() -> None:
     statistics = Statistics.of(papers_curves())
     found = fit_relations(NAMES, statistics, thresholds_for_count(statistics, 15))
@@ -269,4 +282,3 @@ def test_the_slopes_keep_mean_and_deviation() -> None:
         if r.kind == "linear":
             made = r.offset + r.slopes[0] * curves[r.controllers[0]]
             assert_allclose([made.mean(), made.std()], [curves[name].mean(), curves[name].std()])
-

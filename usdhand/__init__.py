@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from usdhand.version import __version__
+
 if TYPE_CHECKING:
     from usdhand.api import (
         apply_rig,
@@ -21,9 +23,8 @@ if TYPE_CHECKING:
         write_rig,
     )
 
-__version__ = "0.1.0"
-
 __all__ = [
+    "__version__",
     "apply_rig",
     "check_file",
     "compare",

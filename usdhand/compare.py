@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from usdhand.anatomy.channels import Hands
 from usdhand.errors import UsageError
@@ -79,11 +80,12 @@ def compare_clips(
     lag = find_lag(curves_a, _at_rate(curves_b, b.fps, a.fps), a.fps)
     shift = (lag or 0.0) if align else 0.0
     first, count = _overlap(a, b, shift)
-    at_b = (np.arange(first, first + count) / a.fps + shift) * b.fps
+    at_a = np.arange(first, first + count, dtype=np.float64)
+    at_b = np.asarray(at_a * (b.fps / a.fps) + shift * b.fps)
     span = slice(first, first + count)
 
     difference = interpolate(curves_b, at_b) - curves_a[span]
-    difference = (difference + 180.0) % 360.0 - 180.0
+    difference -= 360.0 * np.rint(difference / 360.0)  # by the shorter way round
     joints, angles = _joint_angles(a, b, span, at_b)
     tips_a, tips_b = _common_tips(a, b, hands_a, hands_b)
     distance = 10.0 * np.linalg.norm(interpolate(tips_b, at_b) - tips_a[span], axis=-1)
@@ -110,14 +112,8 @@ def find_lag(a: Array, b: Array, fps: float) -> float | None:
     if min(len(a), len(b)) < 8 or max(np.ptp(a, axis=0).max(), np.ptp(b, axis=0).max()) < STILL_DEG:
         return None
     most = min(int(LONGEST_LAG_S * fps), min(len(a), len(b)) // 2)
-    shifts = range(-most, most + 1)
-
-    def cost(shift: int) -> float:
-        start, end = max(0, -shift), min(len(a), len(b) - shift)
-        d = b[start + shift : end + shift] - a[start:end]
-        return float(np.mean(d.var(axis=0)))
-
-    costs = np.array([cost(s) for s in shifts])
+    shifts = np.arange(-most, most + 1)
+    costs = _variances_of_difference(a, b, shifts)
     best = int(np.argmin(costs))
     fraction = 0.0
     if 0 < best < len(costs) - 1:
@@ -125,6 +121,27 @@ def find_lag(a: Array, b: Array, fps: float) -> float | None:
         bend = low - 2 * mid + high
         fraction = 0.5 * (low - high) / bend if bend > 0 else 0.0
     return float((shifts[best] + fraction) / fps)
+
+
+def _variances_of_difference(a: Array, b: Array, shifts: NDArray[np.intp]) -> Array:
+    """Mean variance of ``b[t + shift] - a[t]`` over the curves, where both are, for every shift.
+
+    Sums over the overlap are differences of running sums, products come from Fourier transforms.
+    """
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    start, end = np.maximum(0, -shifts), np.minimum(len(a), len(b) - shifts)
+    count = (end - start)[:, None]
+
+    def sums(curves: Array, first: NDArray[np.intp], last: NDArray[np.intp]) -> Array:
+        running = np.concatenate([np.zeros((1, curves.shape[1])), np.cumsum(curves, axis=0)])
+        return np.asarray(running[last] - running[first])
+
+    size = len(a) + len(b)
+    spectrum = np.fft.rfft(b, size, axis=0) * np.conj(np.fft.rfft(a, size, axis=0))
+    products = np.fft.irfft(spectrum, size, axis=0)[shifts]
+    squares = sums(a**2, start, end) + sums(b**2, start + shifts, end + shifts) - 2 * products
+    total = sums(b, start + shifts, end + shifts) - sums(a, start, end)
+    return np.asarray((squares / count - (total / count) ** 2).mean(axis=1))
 
 
 def rms_jerk(curves: Array, fps: float) -> float:
@@ -147,7 +164,7 @@ def _at_rate(curves: Array, fps: float, wanted: float) -> Array:
     if abs(fps - wanted) < 1e-6:
         return curves
     count = int(np.floor((len(curves) - 1) * wanted / fps + 1e-6)) + 1
-    return interpolate(curves, np.arange(count) * fps / wanted)
+    return interpolate(curves, np.arange(count, dtype=np.float64) * (fps / wanted))
 
 
 def _joint_angles(a: Clip, b: Clip, span: slice, at_b: Array) -> tuple[tuple[str, ...], Array]:

@@ -32,7 +32,7 @@ def euler_angles(q: Array) -> Array:
     a, b, c, d = y - z, w + x, y + z, w - x
     minus, plus = np.arctan2(a, b), np.arctan2(c, d)
     p, r = np.hypot(a, b), np.hypot(c, d)
-    if min(p.min(initial=2.0), r.min(initial=2.0)) < NEAR_LOCK:
+    if np.minimum(p, r).min(initial=2.0) < NEAR_LOCK:
         flips = _sign_changes(q) * np.pi
         minus, p = _through_zero(minus + flips, p)
         plus, r = _through_zero(plus + flips, r)
@@ -49,25 +49,28 @@ def from_euler(angles: Array) -> Array:
     p, r = np.sin(half[0] + np.pi / 4), np.cos(half[0] + np.pi / 4)
     minus, plus = half[1] - half[2], half[1] + half[2]
     a, b, c, d = p * np.sin(minus), p * np.cos(minus), r * np.sin(plus), r * np.cos(plus)
-    return np.stack([b - d, a + c, c - a, b + d]) * np.sqrt(0.5)
+    return np.asarray(np.sqrt(0.5) * np.stack([b - d, a + c, c - a, b + d]))
 
 
 def swing_twist_angles(q: Array) -> Array:
     """Rotation vector of the swing (two angles) after a twist about the bone.
 
-    Nowhere near a lock until the bone has turned round to its opposite direction.
+    Nowhere near a lock until the bone has turned round to its opposite direction, where the swing
+    goes on beyond half a turn.
     """
-    x, y, z, w = q
-    length = np.hypot(z, w)
-    safe = np.where(length > 1e-9, length, 1.0)
-    s, c = np.where(length > 1e-9, z / safe, 0.0), np.where(length > 1e-9, w / safe, 1.0)
+    x, y, z, w = same_signs(q)
+    half, length = np.arctan2(z, w), np.hypot(z, w)
+    if length.min(initial=2.0) < NEAR_LOCK:
+        half, length = _through_zero(half, length)
+        if length.mean() < 0:  # the shorter way round for most of the time
+            half, length = half + np.pi, -length
+    s, c = np.sin(half), np.cos(half)
     sine = np.hypot(x, y)
-    # angle / sine tends to 2 for small swings
-    scale = np.where(
-        sine > 1e-12, 2.0 * np.arctan2(sine, length) / np.where(sine > 1e-12, sine, 1.0), 2.0
-    )
-    swing = [(x * c - y * s) * scale, (x * s + y * c) * scale]
-    return unwrapped(np.degrees(np.stack([*swing, 2.0 * np.arctan2(s, c)])))
+    moving = sine > 1e-12
+    # Of a small swing, angle / sine is 2.
+    scale = np.where(moving, 2.0 * np.arctan2(sine, length) / np.where(moving, sine, 1.0), 2.0)
+    swing = np.degrees([(x * c - y * s) * scale, (x * s + y * c) * scale])
+    return np.concatenate([swing, unwrapped(np.degrees(2.0 * half)[None])])
 
 
 def from_swing_twist(angles: Array) -> Array:

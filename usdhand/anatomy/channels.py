@@ -160,14 +160,29 @@ class Hands:
     frames: Mapping[Side, HandFrames]
 
     @classmethod
-    def of(cls, clip: Clip, character: CharacterMap, sides: Sequence[Side] = SIDES) -> Hands:
-        """Build the frames of the hands that are there."""
+    def of(
+        cls,
+        clip: Clip,
+        character: CharacterMap,
+        sides: Sequence[Side] = SIDES,
+        others: Sequence[Clip] = (),
+    ) -> Hands:
+        """Build the frames of the hands that are there.
+
+        ``others`` are more clips of the same skeleton: what geometry cannot decide is then the
+        same for all of them.
+        """
         found = {
-            side: hand_frames(clip.skeleton, character.hands[side], clip)
+            side: hand_frames(clip.skeleton, character.hands[side], clip, *others)
             for side in sides
             if side in character.hands
         }
         return cls(character, found)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was guessed about the hands and their frames, in words."""
+        return (*self.character.notes, *(n for f in self.frames.values() for n in f.notes))
 
     @property
     def all_names(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ palm on both hands.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,8 @@ from usdhand.motion.rotations import Array
 
 # A thumb bone closer to the palm's normal than this has no flexion axis from geometry.
 UNDECIDED_SINE = 0.35
+# Joints that turn less than this tell nothing about their axis.
+LEAST_MOTION_DEG = 1.0
 # Direction of a relaxed thumb's metacarpal: along the hand, to the radial side, toward the palm.
 NEUTRAL_THUMB = (0.70, 0.60, 0.40)
 # A tip joint counts if its bone is this long relative to the bone before it.
@@ -68,12 +71,13 @@ class HandFrames:
         )
 
 
-def hand_frames(skeleton: Skeleton, hand: HandMap, clip: Clip | None = None) -> HandFrames:
+def hand_frames(skeleton: Skeleton, hand: HandMap, *clips: Clip) -> HandFrames:
     """Build the anatomical frames of a hand at the bind pose.
 
     Parameters
     ----------
-    clip : motion of this skeleton; decides a thumb's flexion axis where geometry cannot
+    clips : motion of this skeleton; decides a thumb's flexion axis where geometry cannot, that
+        is for a bone that stands on the palm
 
     Raises
     ------
@@ -93,11 +97,11 @@ def hand_frames(skeleton: Skeleton, hand: HandMap, clip: Clip | None = None) -> 
         for name, start, end in zip(chain, points[:-1], points[1:], strict=True):
             j = hand.joints[name]
             bone = _direction(skeleton, j, end - start)
-            own = palm.frame(bone, None if digit == "Thumb" else above)
-            if digit == "Thumb" and palm.is_normal(bone):
-                own, note = _frame_from_motion(skeleton, j, bone, above, clip)
-                notes.append(f"{hand.side} {name}: {note}")
             first = name == chain[0]
+            if digit == "Thumb" and not first and palm.is_normal(bone):
+                above, note = _flexing_as_it_moves(skeleton, j, bone, above, clips)
+                notes.append(f"{hand.side} {name}: {note}")
+            own = _swung(above, bone) if digit == "Thumb" and first else _bent(above, bone)
             parent = int(skeleton.parents[j])
             reference = hand.wrist if first and not _below(skeleton, j, hand.wrist) else parent
             reference_frames.append(skeleton.bind_rotations[reference].T @ above)
@@ -143,7 +147,7 @@ class _Palm:
         wrist = position[hand.wrist]
         forward, across = middle - wrist, inner - outer
         normal = np.cross(forward, across) * (1.0 if hand.side == "left" else -1.0)
-        if np.linalg.norm(normal) < 1e-6 * max(np.linalg.norm(forward), 1e-6):
+        if np.linalg.norm(normal) < max(1e-6 * float(np.linalg.norm(forward)), 1e-12):
             raise HandNotFoundError(
                 f"The wrist and the knuckles of the {hand.side} hand lie on one line at the bind "
                 "pose, so the palm has no direction. The bind transforms are probably missing."
@@ -152,15 +156,9 @@ class _Palm:
         radial = np.cross(forward, normal) * (-1.0 if hand.side == "left" else 1.0)
         return cls(wrist, forward, _unit(radial), normal)
 
-    def frame(self, bone: Array, above: Array | None = None) -> Array:
-        """Frame (3, 3) of a bone: flexion across the bone in the palm's plane.
-
-        A bone that stands on the palm takes the flexion axis of the bone before it.
-        """
-        axis = np.cross(_unit(bone), self.normal)
-        if above is not None and np.linalg.norm(axis) < UNDECIDED_SINE:
-            axis = above[:, 1]
-        return _frame(bone, axis)
+    def frame(self, bone: Array) -> Array:
+        """Frame (3, 3) of a bone along the palm: flexion across it, in the palm's plane."""
+        return _frame(bone, np.cross(_unit(bone), self.normal))
 
     def is_normal(self, bone: Array) -> bool:
         """Whether a bone stands on the palm, so that it has no flexion axis from geometry."""
@@ -178,25 +176,52 @@ def _frame(bone: Array, flexion_axis: Array) -> Array:
     return np.stack([np.cross(y, z), y, z], axis=1)
 
 
-def _frame_from_motion(
-    skeleton: Skeleton, joint: int, bone: Array, above: Array, clip: Clip | None
+def _bent(above: Array, bone: Array) -> Array:
+    """Frame (3, 3) of a bone that is bent from the one before it, without twist.
+
+    Flexion and abduction alone lead from ``above`` to the bone, so that how far the digits were
+    bent at the bind pose does not matter, be it a fist.
+    """
+    x, y, z = above.T @ _unit(bone)
+    flexion, abduction = np.arctan2(x, z), np.arcsin(np.clip(-y, -1.0, 1.0))
+    turn = rot.multiply(_about(1, flexion), _about(0, abduction))
+    return np.asarray(above @ rot.to_matrix(turn))
+
+
+def _swung(above: Array, bone: Array) -> Array:
+    """Frame (3, 3) of a bone that the shortest rotation brings there from ``above``."""
+    return np.asarray(rot.to_matrix(rot.between_vectors(above[:, 2], _unit(bone))) @ above)
+
+
+def _about(axis: int, radians: float) -> Array:
+    return rot.from_axis_angle(np.eye(3)[axis], radians)
+
+
+def _flexing_as_it_moves(
+    skeleton: Skeleton, joint: int, bone: Array, above: Array, clips: Sequence[Clip]
 ) -> tuple[Array, str]:
-    """Frame whose flexion axis is the principal axis of the joint's motion across the bone."""
-    z = _unit(bone)
-    fallback = _frame(bone, above[:, 1] if abs(above[:, 1] @ z) < 0.9 else above[:, 0])
-    if clip is None or len(clip) < 2:
-        return fallback, "geometry does not tell its flexion axis; taken from the bone before it"
-    rotations = clip.rotations[:, joint]
-    away = rot.multiply(rotations, rot.conjugate(rot.mean(rotations)))
+    """Frame of the bone before a joint, turned to the principal axis of the joint's motion.
+
+    Only where there is no other way: frames from motion differ from clip to clip and from rig to
+    rig, which is worse than an axis that is somewhat off.
+    """
+    unknown = "geometry does not tell its flexion axis; taken from"
+    kept = above, f"{unknown} the bone before it"
+    rotations = [c.rotations[:, joint] for c in clips]
+    if sum(map(len, rotations)) < 2:
+        return kept
+    together = np.concatenate(rotations)
+    away = rot.multiply(together, rot.conjugate(rot.mean(together)))
     parent = int(skeleton.parents[joint])
     to_world = skeleton.bind_rotations[parent] if parent >= 0 else np.eye(3)
     turns = rot.to_rotation_vector(away) @ to_world.T
+    z = _unit(bone)
     turns = turns - np.outer(turns @ z, z)
     axis = np.linalg.eigh(turns.T @ turns)[1][:, -1]
-    if np.degrees(np.abs(turns @ axis).max()) < 1.0:
-        return fallback, "geometry does not tell its flexion axis; taken from the bone before it"
-    axis = axis * np.sign(axis @ fallback[:, 1] or 1.0)
-    return _frame(bone, axis), "geometry does not tell its flexion axis; taken from its motion"
+    if np.degrees(np.abs(turns @ axis).max()) < LEAST_MOTION_DEG:
+        return kept
+    axis = axis * np.sign(axis @ _bent(above, bone)[:, 1] or 1.0)
+    return _frame(above[:, 2], axis), f"{unknown} its motion"
 
 
 def _digit_points(
@@ -208,7 +233,7 @@ def _digit_points(
     tip = points[-1] + LAST_BONE_RATIO * before
     if digit in hand.tips:
         authored = skeleton.bind_positions[hand.tips[digit]]
-        ratio = np.linalg.norm(authored - points[-1]) / max(np.linalg.norm(before), 1e-9)
+        ratio = np.linalg.norm(authored - points[-1]) / np.linalg.norm(before)
         if TIP_LENGTH_RANGE[0] < ratio < TIP_LENGTH_RANGE[1]:
             tip = authored
     return [*points, tip], tip

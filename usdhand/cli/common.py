@@ -5,11 +5,14 @@ from __future__ import annotations
 import glob
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from usdhand.errors import UsageError
+
+if TYPE_CHECKING:
+    from usdhand.motion import Clip
 
 F = TypeVar("F", bound=Callable[..., Any])
 USD_PATTERNS = (".usd", ".usda", ".usdc", ".usdz")
@@ -108,6 +111,13 @@ def warn(text: str, quiet: bool = False) -> None:
     """Print a warning to stderr."""
     if not quiet:
         click.echo(f"Warning: {text}", err=True)
+
+
+def warn_of(clip: Clip, quiet: bool) -> None:
+    """Print what is odd about a clip that was read."""
+    for problem in clip.problems:
+        if problem.severity == "warning":
+            warn(f"{clip.origin.path}: {problem}", quiet)
 
 
 def with_progress(items: Sequence[Any], label: str) -> Iterator[Any]:

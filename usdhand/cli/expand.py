@@ -17,7 +17,7 @@ from usdhand.cli.common import (
     report_option,
     say,
     skel_option,
-    warn,
+    warn_of,
     write_report,
 )
 
@@ -76,8 +76,7 @@ def command(
         motion = api.expand(rig, conventions)
     else:
         motion = api.expand_onto(rig, onto, skel, conventions)
-    for problem in motion.problems:
-        warn(f"{motion.origin.path}: {problem}", quiet)
+    warn_of(motion, quiet)
     if not dry_run:
         api.write_clip(
             motion, output, flatten=flatten, force=force, conventions=conventions, inputs=inputs

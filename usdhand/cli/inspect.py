@@ -106,7 +106,7 @@ def _text(result: dict[str, Any], verbose: bool) -> str:
         lines += _hand_lines(result, verbose)
     lines += [f"  note: {note}" for note in result.get("notes", ())]
     lines += [
-        f"  problem: {p['message']}" + (f" ({p['where']})" if p["where"] else "")
+        f"  {p['severity']}: {p['message']}" + (f" ({p['where']})" if p["where"] else "")
         for p in result["problems"]
     ]
     return "\n".join(lines)

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-import usdhand
 from usdhand.errors import UsdHandError
+from usdhand.version import __version__
 
 # Verb -> (module, one line of help). Kept here so that `--help` imports no verb.
 VERBS = {
@@ -54,7 +54,7 @@ class VerbGroup(click.Group):
 
 
 @click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(usdhand.__version__, prog_name="usdhand")
+@click.version_option(__version__, prog_name="usdhand")
 def main() -> None:
     """Hands for digital characters, over OpenUSD.
 

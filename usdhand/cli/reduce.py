@@ -25,6 +25,7 @@ from usdhand.cli.common import (
     table,
     verbose_option,
     warn,
+    warn_of,
     with_progress,
     write_report,
 )
@@ -147,8 +148,7 @@ def command(
     rig = api.read_rig(rig_file) if rig_file else None
     read = [api.read_clip(path, skel) for path in with_progress(paths, "reading")]
     for clip in read:
-        for problem in clip.problems:
-            warn(f"{clip.origin.path}: {problem}", quiet)
+        warn_of(clip, quiet)
     reductions = api.reduce_hands(
         read,
         preset=preset,
@@ -167,6 +167,9 @@ def command(
         for r, o in zip(reductions, outputs, strict=True)
     ]
     inputs = [*paths, *([rig_file] if rig_file else []), *maps]
+    for reduction in reductions:
+        for note in reduction.hands.notes:
+            warn(f"{reduction.clip.origin.path}: {note}", quiet)
     whole = results[0] if len(results) == 1 else {"clips": results}
     text = dumps(document("reduce", inputs, settings, whole))
     if not dry_run:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -15,12 +16,14 @@ from usdhand.motion.skeleton import Skeleton
 class Problem:
     """Something a person should know about a file, that did not stop the work.
 
-    ``code`` is a stable name for scripts, ``where`` a prim, joint or frame.
+    ``code`` is a stable name for scripts, ``where`` a prim, joint or frame. A ``note`` is right as
+    it is and only good to know.
     """
 
     code: str
     message: str
     where: str = ""
+    severity: Literal["warning", "note"] = "warning"
 
     def __str__(self) -> str:
         return f"{self.message} ({self.where})" if self.where else self.message
@@ -97,7 +100,7 @@ class Clip:
     def time_codes(self) -> Array:
         """(frames,) time codes in its file."""
         o = self.origin
-        return o.first_time_code + np.arange(len(self)) * o.time_codes_per_frame
+        return np.asarray(o.first_time_code + np.arange(len(self)) * o.time_codes_per_frame, float)
 
     def with_rotations(self, rotations: Array) -> Clip:
         """Return the same clip with other joint rotations."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from usdhand.motion.clip import Clip
 from usdhand.motion import rotations as rot
+from usdhand.motion.clip import Clip
 from usdhand.motion.rotations import Array
 
 

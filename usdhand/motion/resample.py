@@ -41,7 +41,7 @@ def resample(clip: Clip, fps: float) -> Clip:
             f"Cannot resample {clip.name} to {fps} frames a second: give a number > 0."
         )
     count = int(np.floor(clip.duration * fps + 1e-6)) + 1
-    frames = np.arange(count) * (clip.fps / fps)
+    frames = np.asarray(np.arange(count) * (clip.fps / fps), float)
     origin = replace(clip.origin, time_codes_per_frame=clip.origin.time_codes_per_second / fps)
     scales = clip.scales
     constant = scales.strides[0] == 0

@@ -38,7 +38,6 @@ class Errors:
         """Largest difference of any channel in any frame, degrees."""
         return float(self.max.max(initial=0.0))
 
-
     def of_channels(self, names: Sequence[str], fingertips: Array) -> Errors:
         """Return the errors of some channels, with other ``fingertips`` (see `distances`)."""
         index = {name: i for i, name in enumerate(self.names)}

@@ -99,7 +99,8 @@ def controllers(statistics: Statistics, thresholds: Thresholds) -> NDArray[np.in
     Of several controllers within the threshold the one with the largest standard deviation
     counts (section 5.2).
     """
-    return controllers_at(statistics, thresholds.range, np.array([thresholds.rmsd]))[0]
+    roots = controllers_at(statistics, thresholds.range, np.array([thresholds.rmsd]))
+    return np.asarray(roots[0])
 
 
 def controllers_at(statistics: Statistics, range_deg: float, rmsds: Array) -> NDArray[np.intp]:

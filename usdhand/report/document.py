@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import usdhand
 from usdhand.formats.hashing import file_hash
+from usdhand.version import __version__
 
 SCHEMA_VERSION = 1
 
@@ -23,7 +23,7 @@ def document(
     """Wrap a result with what is needed to make it again."""
     return {
         "schema": f"usdhand.{verb}/{SCHEMA_VERSION}",
-        "usdhand": usdhand.__version__,
+        "usdhand": __version__,
         "inputs": [{"path": str(p), "sha256": file_hash(p)} for p in inputs],
         "settings": dict(settings),
         **result,

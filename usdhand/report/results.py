@@ -38,7 +38,7 @@ def inspect_result(clip: Clip, hands: Hands | None, animated: bool = True) -> di
         if animated:
             result["channels"] = _channel_ranges(clip, hands)
             result["off_axis_share"] = _off_axis_shares(clip, hands)
-        result["notes"] += [note for f in hands.frames.values() for note in f.notes]
+        result["notes"] = list(hands.notes)
     return result
 
 
@@ -74,7 +74,10 @@ def map_data(clip: Clip, character: CharacterMap) -> dict[str, Any]:
 
 def problems_data(problems: Sequence[Problem]) -> list[dict[str, str]]:
     """Problems as plain data."""
-    return [{"code": p.code, "message": p.message, "where": p.where} for p in problems]
+    return [
+        {"severity": p.severity, "code": p.code, "message": p.message, "where": p.where}
+        for p in problems
+    ]
 
 
 def reduce_result(reduction: Reduction) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pxr import Sdf, UsdSkel, Vt
 
 from usdhand.formats.usd.curves import Tracks, frame_times, joint_targets
-from usdhand.formats.usd.samples import Track, blocks, steady
+from usdhand.formats.usd.samples import EVERY, Places, Track, blocks, steady
 from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import world_above
 from usdhand.motion import Clip
@@ -21,48 +21,59 @@ from usdhand.motion.rotations import Array
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """Motion of the input that stays to the bit: some joints at all frames.
+    """Motion of the input at the frames of a clip.
 
-    ``elements`` of the input's arrays belong to the joints ``places``.
+    Attributes
+    ----------
+    times : time codes of the frames
+    elements, places : which of the input's elements belong to which joints
+    changed : joints that come from the clip all the same, or that the input does not have
     """
 
     times: Array
     tracks: Tracks
-    elements: NDArray[np.intp]
-    places: NDArray[np.intp]
+    elements: Places
+    places: Places
+    changed: NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
 class FileCurve:
-    """Values (frames, joints, n) of a motion attribute, on their way to a file.
+    """A motion attribute on its way to a file.
 
-    They are divided by ``unit``; at ``roots`` there are ``root_values`` instead, and what is kept
-    of the input comes from ``track``.
+    Attributes
+    ----------
+    values : (frames, joints, n) of the clip
+    roots, root_values : joints that stand somewhere else without what is above the skeleton
+    unit : what all of these are divided by
+    own : joints that come from them; the others are ``kept``, from ``track``
     """
 
     values: Array
     roots: NDArray[np.intp]
     root_values: Array
     unit: float
-    track: Track | None
-    kept: Kept | None
+    own: NDArray[np.intp]
+    kept: Kept | None = None
+    track: Track | None = None
 
     @property
     def still(self) -> bool:
         """Whether one value is enough for all frames."""
         moves = self.track is not None and not self.track.still
-        return not moves and steady(self.values) and steady(self.root_values)
+        return not moves and steady(self.values, self.own) and steady(self.root_values)
 
     def rows(self, dtype: Any) -> Iterator[NDArray[Any]]:
         """Values frame by frame; made block by block, in the processor's cache."""
+        among_own = np.searchsorted(self.own, self.roots)
         for block in blocks(len(self.values)):
-            values = self.values[block].copy()
-            values[:, self.roots] = self.root_values[block]
-            if self.unit != 1.0:
-                values /= self.unit
-            rows = values.astype(dtype)
+            values = self.values[block]
+            rows = np.empty(values.shape, dtype)
             if self.track is not None and self.kept is not None:
                 self.track.fill(rows, block.start, self.kept.elements, self.kept.places)
+            values = np.take(values, self.own, axis=1)  # five times faster than an index
+            values[:, among_own] = self.root_values[block]
+            rows[:, self.own] = values if self.unit == 1.0 else values / self.unit
             yield from rows
 
 
@@ -101,7 +112,7 @@ def author_animation(
 
 
 def _kept(character: Character, clip: Clip, changed: Sequence[int]) -> Kept | None:
-    """Return what stays of the input, None if the clip has other frames."""
+    """Return the input's motion, None if the clip has other frames."""
     if character.animation is None:
         return None
     animation = UsdSkel.Animation(character.animation)
@@ -110,8 +121,11 @@ def _kept(character: Character, clip: Clip, changed: Sequence[int]) -> Kept | No
     times, _ = frame_times(character.stage, tracks.times)
     if len(times) != len(clip) or not np.allclose(times, clip.time_codes, rtol=1e-12, atol=1e-6):
         return None
-    elements = np.flatnonzero((targets >= 0) & ~np.isin(targets, changed))
-    return Kept(times, tracks.at(times), elements, targets[elements])
+    every = np.arange(len(clip.skeleton))
+    whole = np.array_equal(targets, every)
+    elements = EVERY if whole else np.flatnonzero(targets >= 0)
+    own = np.flatnonzero(np.isin(every, changed) | ~np.isin(every, targets))
+    return Kept(times, tracks.at(times), elements, targets[elements], own)
 
 
 def _file_curves(
@@ -123,9 +137,17 @@ def _file_curves(
     above = rot.conjugate(rot.from_matrix(world.rotation))[:, None]
     turned = rot.multiply(above, clip.rotations[:, roots])
     moved = rot.rotate(above, clip.translations[:, roots] - world.translation[:, None])
+
+    def curve(values: Array, root_values: Array, track: Track | None, unit: float) -> FileCurve:
+        if kept is None or track is None:
+            every = np.arange(len(clip.skeleton))
+            return FileCurve(values, roots, root_values, unit, every)
+        own = np.isin(roots, kept.changed)
+        return FileCurve(values, roots[own], root_values[:, own], unit, kept.changed, kept, track)
+
     tracks = Tracks(None, None, None) if kept is None else kept.tracks
     return (
-        FileCurve(clip.rotations, roots, turned, 1.0, tracks.rotations, kept),
-        FileCurve(clip.translations, roots, moved, world.scale, tracks.translations, kept),
-        FileCurve(clip.scales, roots, clip.scales[:, roots], 1.0, tracks.scales, kept),
+        curve(clip.rotations, turned, tracks.rotations, 1.0),
+        curve(clip.translations, moved, tracks.translations, world.scale),
+        curve(clip.scales, clip.scales[:, roots], tracks.scales, 1.0),
     )

@@ -10,6 +10,7 @@ from pxr import Sdf, Usd, UsdValidation
 from usdhand.formats.usd.check_animation import animation_findings
 from usdhand.formats.usd.check_skeleton import skeleton_findings
 from usdhand.formats.usd.findings import Finding, Severity
+from usdhand.formats.usd.rig import rig_findings
 from usdhand.formats.usd.stage import (
     choose_skeleton,
     find_skeletons,
@@ -53,6 +54,7 @@ def check_file(path: str | Path, skel: str | None = None) -> tuple[Finding, ...]
 def _stage_findings(path: Path, stage: Usd.Stage, skel: str | None) -> Iterator[Finding]:
     yield from validator_findings(stage)
     yield from rate_findings(stage)
+    yield from rig_findings(stage, path)
     skeletons = find_skeletons(stage)
     if not skeletons:
         yield Finding("warning", "no-skeleton", "there is no UsdSkel skeleton", str(path))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel
 
-from usdhand.formats.usd.findings import Finding
+from usdhand.formats.usd.findings import Finding, Severity
 from usdhand.formats.usd.poses import MISPLACED_BIND_CM
 from usdhand.formats.usd.world import world_problems
 from usdhand.motion import leaf_name, parents_from_paths
@@ -30,7 +30,8 @@ def skeleton_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
     yield from _order_findings(joints, where)
     yield from _pose_findings(skeleton, joints, where)
     for problem in world_problems(skeleton):
-        yield Finding("warning", problem.code, problem.message, problem.where)
+        severity: Severity = "error" if problem.code == "zero-scale" else "warning"
+        yield Finding(severity, problem.code, problem.message, problem.where)
 
 
 def legal_name(name: str) -> str:

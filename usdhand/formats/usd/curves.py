@@ -20,6 +20,8 @@ STEADY_TOLERANCE = 1e-3  # frames: how far samples may lie off a steady grid
 SLOWEST_NATIVE_FPS = 12.0  # sparser samples are keys of curves, not frames
 FASTEST_TIME_CODES = 240.0  # above, time codes are ticks rather than frames
 
+MOST_FRAMES = 1_000_000  # more is a mistake in time codes: 4.6 hours at 60 fps
+
 Fault = tuple[NDArray[np.bool_], str]  # (samples, joints) that cannot be used, and what they are
 Finish = Callable[[Array, slice], Fault | None]
 
@@ -132,29 +134,55 @@ def finish_vectors(factor: float) -> Finish:
 
 
 def frame_times(stage: Usd.Stage, samples: list[Array]) -> tuple[Array, tuple[Problem, ...]]:
-    """Time codes of a clip's frames: those of its samples where steady, else a steady grid."""
+    """Time codes of a clip's frames: those of its samples where steady, else a steady grid.
+
+    Raises
+    ------
+    InputError
+        if the time codes cannot be meant.
+    """
     times = _union(samples)
+    per_second = stage.GetTimeCodesPerSecond()
+    if not np.isfinite(times).all() or not 0 < per_second < np.inf:
+        raise InputError(
+            f"{stage.GetRootLayer().realPath}: its time codes are no times, at {per_second:g} time "
+            "codes a second. Export the animation again."
+        )
     if not len(times):
         return np.array([stage.GetStartTimeCode()]), ()
     if len(times) == 1:
         return times, ()
-    per_second = stage.GetTimeCodesPerSecond()
-    frame = 1.0 if per_second <= FASTEST_TIME_CODES else per_second / stage.GetFramesPerSecond()
     step = (times[-1] - times[0]) / (len(times) - 1)
     steady = np.abs(np.diff(times) - step).max() < STEADY_TOLERANCE * step
     if steady and per_second / step >= SLOWEST_NATIVE_FPS:
         return times, ()
-    shortest = float(np.diff(times).min())
-    on_grid = np.abs((times - times[0]) / shortest - np.round((times - times[0]) / shortest)).max()
-    if on_grid < STEADY_TOLERANCE and frame / 20 <= shortest < frame:
-        frame = shortest
+    frame = _frame(times, per_second, stage.GetFramesPerSecond())
     count = int(np.floor((times[-1] - times[0]) / frame + 1e-6)) + 1
+    if count > MOST_FRAMES:
+        raise InputError(
+            f"{stage.GetRootLayer().realPath}: its {len(times)} samples are spread over time codes "
+            f"{times[0]:g} to {times[-1]:g}, which would make {count} frames. Check the time codes "
+            "or timeCodesPerSecond."
+        )
     problem = Problem(
         "resampled",
         f"{len(times)} samples are not a steady sequence of frames: read every {frame:g} time "
         "codes, interpolated as USD does",
     )
     return np.asarray(times[0] + frame * np.arange(count)), (problem,)
+
+
+def _frame(times: Array, per_second: float, fps: float) -> float:
+    """Time codes a frame of a steady grid over unsteady samples."""
+    ticks = per_second > FASTEST_TIME_CODES
+    frame = per_second / (fps if 0 < fps < np.inf else 24.0) if ticks else 1.0
+    shortest = float(np.diff(times).min())
+    on_grid = (times - times[0]) / shortest
+    if np.abs(on_grid - np.round(on_grid)).max() < STEADY_TOLERANCE and (
+        frame / 20 <= shortest < frame
+    ):
+        return shortest
+    return frame
 
 
 def _union(samples: list[Array]) -> Array:

@@ -178,7 +178,8 @@ def _animation_problems(
         yield Problem("unknown-joints", message, where)
     still = len(joints) - len(np.unique(targets[targets >= 0]))
     if still:
-        yield Problem("fewer-joints", f"{still} joints are not animated and stay at rest", where)
+        message = f"{still} joints are not animated and stay at rest"
+        yield Problem("fewer-joints", message, where, "note")
     for track, name in ((tracks.translations, "translations"), (tracks.scales, "scales")):
         if track is None:
             message = (

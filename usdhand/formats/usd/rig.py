@@ -15,6 +15,7 @@ from usdhand.anatomy.frames import HandFrames
 from usdhand.anatomy.hand import SIDES, Side
 from usdhand.errors import InputError
 from usdhand.formats.hashing import file_hash
+from usdhand.formats.usd.findings import Finding
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.stage import Character, find_character, open_stage
 from usdhand.formats.usd.write import write_motion
@@ -135,6 +136,24 @@ def rig_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     """All rigs on a stage, told by their version attribute: works without the schema."""
     everything = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
     return (prim for prim in everything if prim.GetAttribute("usdhand:version").HasAuthoredValue())
+
+
+def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Finding]:
+    """What is wrong with the rigs of a stage; see `usdhand.formats.usd.check.check_file`."""
+    for prim in rig_prims(stage):
+        where = str(prim.GetPath())
+        try:
+            rig = _relations(prim, path)
+        except InputError as error:
+            yield Finding("error", "broken-rig", str(error), where)
+            continue
+        if _skeleton_path(prim) is None:
+            yield Finding("error", "rig-skeleton", "the rig's skeleton is not on the stage", where)
+        for name in rig.free:
+            attribute = prim.GetAttribute(f"{CHANNEL_PREFIX}:{name}:value")
+            if not attribute.HasAuthoredValue():
+                message = f"the free channel '{name}' has no value"
+                yield Finding("error", "rig-no-value", message, where)
 
 
 # -- writing ------------------------------------------------------------------------------------

@@ -105,11 +105,12 @@ def blocks(count: int) -> Iterator[slice]:
     return (slice(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK))
 
 
-def steady(values: NDArray[Any]) -> bool:
-    """Whether all rows are the same."""
+def steady(values: NDArray[Any], joints: Places = EVERY) -> bool:
+    """Whether all rows (frames, joints, n) are the same, of some joints."""
     if len(values) < 2 or values.strides[0] == 0:
         return True
-    return all(bool((values[block] == values[0]).all()) for block in blocks(len(values)))
+    first = values[0][joints]
+    return all(bool((values[block][:, joints] == first).all()) for block in blocks(len(values)))
 
 
 def _same(times: Array, own: Array) -> bool:

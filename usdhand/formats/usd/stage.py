@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
@@ -43,7 +44,7 @@ def usd_diagnostics() -> Iterator[list[str]]:
     try:
         yield messages
     finally:
-        messages += [d.commentary.strip() for d in delegate.TakeUncoalescedDiagnostics()]
+        messages += [_sentence(d) for d in delegate.TakeUncoalescedDiagnostics()]
         del delegate
 
 
@@ -68,7 +69,7 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
         try:
             stage = Usd.Stage.Open(str(path))
         except Tf.ErrorException as error:
-            messages += [e.commentary.strip() for e in error.args]
+            messages += [_sentence(e) for e in error.args]
     if stage is None:
         detail = f" ({_first_line(messages[0])})" if messages else ""
         raise InputError(f"{path}: USD cannot read this file; it may be damaged or no USD{detail}.")
@@ -147,6 +148,13 @@ def choose_skeleton(path: Path, skeletons: list[Usd.Prim], skel: str | None) -> 
         return found[0]
     reason = "no skeleton" if not found else f"{len(found)} skeletons"
     raise UsageError(f"{path}: --skel {skel} matches {reason}; there are: {names}")
+
+
+def _sentence(diagnostic: Any) -> str:
+    try:
+        return str(diagnostic.commentary).strip()
+    except UnicodeDecodeError:  # it quotes bytes of a damaged file
+        return "it holds bytes that are no text"
 
 
 def _first_line(text: str) -> str:

@@ -47,6 +47,8 @@ def world_above(skeleton: Usd.Prim, times: Array | None = None) -> World:
     u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
     axes = Y_UP_FROM_Z_UP if str(UsdGeom.GetStageUpAxis(stage)) == "Z" else np.eye(3)
     cm = 100.0 * UsdGeom.GetStageMetersPerUnit(stage)
+    if not 0 < cm < np.inf:
+        raise InputError(f"{stage.GetRootLayer().realPath}: metersPerUnit is {cm / 100.0:g}.")
     return World(
         scale=float(np.exp(np.log(singular[0]).mean())) * cm,
         rotation=axes @ u @ vt,
@@ -62,6 +64,7 @@ def world_problems(skeleton: Usd.Prim, times: Array | None = None) -> tuple[Prob
     largest, smallest = singular.max(axis=1), singular.min(axis=1)
     uneven = UNIFORM_SCALE_TOLERANCE * smallest
     found = {
+        "zero-scale": ((smallest < 1e-12).any(), "a zero scale stands above the skeleton"),
         "non-uniform-scale": (
             (largest > smallest + uneven).any(),
             "a non-uniform scale stands above the skeleton: bones are read with its mean",

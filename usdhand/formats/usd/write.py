@@ -17,6 +17,7 @@ from usdhand.formats.usd.stage import (
     USD_SUFFIXES,
     Character,
     binding_prim,
+    find_skeletons,
     open_stage,
 )
 from usdhand.motion import Clip
@@ -79,29 +80,45 @@ def write_motion(
 
 def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> None:
     """Save a layer to ``output``: written beside, opened once to see that it holds, then moved."""
-    suffix = output.suffix.lower()
     with written_beside(output) as temporary:
-        if not flatten and suffix != ".usdz":
-            _export(layer, temporary)
-            _verify(temporary)
+        if output.suffix.lower() == ".usdz":
+            _package(layer, temporary, output)
         else:
-            beside = temporary.with_name(f"{temporary.stem}.layer.usdc")
-            flat = temporary.with_name(f"{output.stem}.{os.getpid()}.flat.usdc")
-            try:
-                _export(layer, beside)
-                stage = Usd.Stage.Open(str(beside))
-                _export(stage.Flatten(), flat if suffix == ".usdz" else temporary)
-                del stage
-                packed = suffix == ".usdz"
-                if packed and not UsdUtils.CreateNewUsdzPackage(str(flat), str(temporary)):
-                    raise OutputError(f"{output}: USD could not make the .usdz package.")
-                _verify(temporary)
-            finally:
-                beside.unlink(missing_ok=True)
-                flat.unlink(missing_ok=True)
+            _export(_flattened(layer, output) if flatten else layer, temporary)
+        _verify(temporary)
     loaded = Sdf.Layer.Find(str(output.absolute()))
     if loaded:
         loaded.Reload(force=True)
+
+
+def _flattened(layer: Sdf.Layer, output: Path) -> Sdf.Layer:
+    """Return one layer for all that ``layer`` is over, with paths as seen from ``output``."""
+    beside = output.with_name(f".{output.stem}.{os.getpid()}.layer.usdc")
+    try:
+        _export(layer, beside)
+        stage = Usd.Stage.Open(str(beside))
+        flat = stage.Flatten(addSourceFileComment=False)
+        del stage
+    finally:
+        beside.unlink(missing_ok=True)
+
+    def relative(asset: str) -> str:
+        return _relative(Path(asset), output) if Path(asset).is_absolute() else asset
+
+    # Flatten makes all paths absolute, and files that move together would lose each other.
+    UsdUtils.ModifyAssetPaths(flat, relative)
+    return flat
+
+
+def _package(layer: Sdf.Layer, temporary: Path, output: Path) -> None:
+    flat = output.with_name(f".{output.stem}.{os.getpid()}.flat.usdc")
+    try:
+        _export(_flattened(layer, output), flat)
+        name = f"{output.stem}.usdc"
+        if not UsdUtils.CreateNewUsdzPackage(str(flat), str(temporary), name):
+            raise OutputError(f"{output}: USD could not make the .usdz package.")
+    finally:
+        flat.unlink(missing_ok=True)
 
 
 def stage_files(stage: Usd.Stage) -> list[Path]:
@@ -191,6 +208,9 @@ def _copy_blend_shapes(layer: Sdf.Layer, path: Sdf.Path, source: UsdSkel.Animati
 
 def _bind(layer: Sdf.Layer, character: Character, animation: Sdf.Path) -> None:
     owner = binding_prim(character.skeleton)
+    sharing = [s for s in find_skeletons(character.stage) if binding_prim(s) == owner]
+    if len(sharing) > 1:  # a binding that other skeletons inherit stays theirs
+        owner = character.skeleton
     prim = Sdf.CreatePrimInLayer(layer, owner.GetPath())
     if not owner.HasAPI(UsdSkel.BindingAPI):
         schemas = Sdf.TokenListOp()
