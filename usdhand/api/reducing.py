@@ -1,13 +1,4 @@
-"""The verbs of usdhand as functions on values; what is odd comes back beside the result.
-
-Example
--------
->>> import usdhand                                             # doctest: +SKIP
->>> clip = usdhand.read_clip("samples/gestures/ok_01.usdc")    # doctest: +SKIP
->>> [reduction] = usdhand.reduce_hands([clip], preset=4)       # doctest: +SKIP
->>> reduction.rig.free                                         # doctest: +SKIP
->>> usdhand.write_rig(reduction, "ok_rig.usdc")                # doctest: +SKIP
-"""
+"""Method 1 on clips and files: reduce and expand."""
 
 from __future__ import annotations
 
@@ -17,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from usdhand.anatomy import SIDES, Conventions, Hands, Side, load_conventions, map_character
-from usdhand.compare import Comparison, compare_clips
-from usdhand.errors import HandNotFoundError, InputError, UsageError
+from usdhand.anatomy import SIDES, Conventions, Side
+from usdhand.api.clips import find_hands, source_file
+from usdhand.errors import UsageError
 from usdhand.formats.usd import rig as usd_rig
-from usdhand.formats.usd.check import Finding, check_file
-from usdhand.formats.usd.read import clip_from_character, read_character, read_clip
+from usdhand.formats.usd.read import clip_from_character, read_character
 from usdhand.formats.usd.stage import find_character
-from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.reduce import (
@@ -38,42 +27,6 @@ from usdhand.reduce import (
     fit_rig,
 )
 from usdhand.reduce import expand as expand_channels
-
-__all__ = [
-    "Comparison",
-    "Finding",
-    "apply_rig",
-    "check_file",
-    "compare",
-    "expand",
-    "expand_onto",
-    "find_hands",
-    "read_character",
-    "read_clip",
-    "read_rig",
-    "reduce_hands",
-    "reduction_target",
-    "write_clip",
-    "write_rig",
-]
-
-
-def find_hands(
-    clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
-) -> Hands:
-    """Find the hands of a clip's skeleton and build their anatomical frames.
-
-    Raises
-    ------
-    HandNotFoundError
-        if there is no hand, or an ambiguous one, or none on the wanted side.
-    """
-    character = map_character(clip.skeleton, conventions)
-    wanted = [side for side in sides if side in character.hands]
-    if not wanted:
-        there = " and ".join(character.hands)
-        raise HandNotFoundError(f"No {' or '.join(sides)} hand was found, only the {there} one.")
-    return Hands.of(clip, character, wanted)
 
 
 def reduction_target(
@@ -170,13 +123,6 @@ def expand_onto(
     return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
 
 
-def compare(
-    a: Clip, b: Clip, *, align: bool = False, conventions: Conventions | None = None
-) -> Comparison:
-    """Compare motion B with motion A; see `usdhand.compare.compare_clips`."""
-    return compare_clips(a, b, find_hands(a, conventions), find_hands(b, conventions), align)
-
-
 def read_rig(path: str | Path) -> ReducedRig:
     """Read the relations of a rig file, to apply them to other clips."""
     return usd_rig.read_rig(path)
@@ -186,44 +132,8 @@ def write_rig(
     reduction: Reduction, output: str | Path, *, flatten: bool = False, force: bool = False
 ) -> None:
     """Write a reduced clip as a rig over the file it was read from."""
-    character = find_character(_source(reduction.clip), reduction.clip.origin.skeleton_path)
+    character = find_character(source_file(reduction.clip), reduction.clip.origin.skeleton_path)
     usd_rig.write_rig(reduction, character, Path(output), flatten=flatten, force=force)
-
-
-def write_clip(
-    clip: Clip,
-    output: str | Path,
-    *,
-    flatten: bool = False,
-    force: bool = False,
-    conventions: Conventions | None = None,
-    inputs: Sequence[Path] = (),
-) -> None:
-    """Write a clip's hands as a layer over the file it was read from; the body stays as it is.
-
-    Raises
-    ------
-    InputError
-        if the clip was not read from a file.
-    OutputError
-        if the output is refused or cannot be written.
-    """
-    character = find_character(_source(clip), clip.origin.skeleton_path)
-    changed = [int(j) for f in find_hands(clip, conventions).frames.values() for j in f.joints]
-    write_motion(
-        character, clip, changed, Path(output), flatten=flatten, force=force, inputs=inputs
-    )
-
-
-def conventions_from(files: Sequence[Path]) -> Conventions | None:
-    """Return the built-in conventions with a user's files on top, None without any."""
-    return load_conventions(*files) if files else None
-
-
-def _source(clip: Clip) -> Path:
-    if clip.origin.path is None:
-        raise InputError(f"{clip.name}: this clip was not read from a file, so there is no stage.")
-    return clip.origin.path
 
 
 def _in_time_of(body: Clip, other: Clip) -> Clip:

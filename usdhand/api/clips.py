@@ -1,0 +1,75 @@
+"""Reading, writing and comparing clips, and finding their hands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from usdhand.anatomy import SIDES, Conventions, Hands, Side, load_conventions, map_character
+from usdhand.compare import Comparison, compare_clips
+from usdhand.errors import HandNotFoundError, InputError
+from usdhand.formats.usd.stage import find_character
+from usdhand.formats.usd.write import write_motion
+from usdhand.motion import Clip
+
+
+def find_hands(
+    clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
+) -> Hands:
+    """Find the hands of a clip's skeleton and build their anatomical frames.
+
+    Raises
+    ------
+    HandNotFoundError
+        if there is no hand, or an ambiguous one, or none on the wanted side.
+    """
+    character = map_character(clip.skeleton, conventions)
+    wanted = [side for side in sides if side in character.hands]
+    if not wanted:
+        there = " and ".join(character.hands)
+        raise HandNotFoundError(f"No {' or '.join(sides)} hand was found, only the {there} one.")
+    return Hands.of(clip, character, wanted)
+
+
+def conventions_from(files: Sequence[Path]) -> Conventions | None:
+    """Return the built-in conventions with a user's files on top, None without any."""
+    return load_conventions(*files) if files else None
+
+
+def write_clip(
+    clip: Clip,
+    output: str | Path,
+    *,
+    flatten: bool = False,
+    force: bool = False,
+    conventions: Conventions | None = None,
+    inputs: Sequence[Path] = (),
+) -> None:
+    """Write a clip's hands as a layer over the file it was read from; the body stays as it is.
+
+    Raises
+    ------
+    InputError
+        if the clip was not read from a file.
+    OutputError
+        if the output is refused or cannot be written.
+    """
+    character = find_character(source_file(clip), clip.origin.skeleton_path)
+    changed = [int(j) for f in find_hands(clip, conventions).frames.values() for j in f.joints]
+    write_motion(
+        character, clip, changed, Path(output), flatten=flatten, force=force, inputs=inputs
+    )
+
+
+def compare(
+    a: Clip, b: Clip, *, align: bool = False, conventions: Conventions | None = None
+) -> Comparison:
+    """Compare motion B with motion A; see `usdhand.compare.compare_clips`."""
+    return compare_clips(a, b, find_hands(a, conventions), find_hands(b, conventions), align)
+
+
+def source_file(clip: Clip) -> Path:
+    """Return the file that a clip was read from; InputError for a clip made in memory."""
+    if clip.origin.path is None:
+        raise InputError(f"{clip.name}: this clip was not read from a file, so there is no stage.")
+    return clip.origin.path
