@@ -58,7 +58,8 @@ def agreement_of_rigs(folder: Path, other: Path) -> list[tuple[Any, ...]]:
                 if name.startswith(SIDE_PREFIX[side]):
                     groups[kind if "Thumb" in name else "four fingers"].append(float(value))
     return [
-        (kind, hands[kind], f"{np.median(v):.3f}", f"{max(v):.3f}") for kind, v in sorted(groups.items())
+        (kind, hands[kind], f"{np.median(v):.3f}", f"{max(v):.3f}")
+        for kind, v in sorted(groups.items())
     ]
 
 

@@ -44,7 +44,9 @@ def blender_python() -> str:
 def load(path: Path, folder: Path, frames: list[float]) -> Loaded:
     target = folder / "blender.npz"
     script = REPOSITORY / "tests" / "blender_dump.py"
-    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PXR_PLUGINPATH_NAME")}
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PXR_PLUGINPATH_NAME")
+    }
     done = subprocess.run(
         [blender_python(), str(script), str(path), str(target), *map(str, frames)],
         capture_output=True, text=True, check=False, env=environment,

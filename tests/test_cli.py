@@ -180,9 +180,7 @@ def test_schema_prints_a_plugin_folder(run: Run) -> None:
 
 @pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usd", ".usdz"])
 @pytest.mark.parametrize("flatten", [False, True])
-def test_outputs_pass_our_own_check(
-    run: Run, tmp_path: Path, suffix: str, flatten: bool
-) -> None:
+def test_outputs_pass_our_own_check(run: Run, tmp_path: Path, suffix: str, flatten: bool) -> None:
     rig_file, motion = tmp_path / f"rig{suffix}", tmp_path / f"motion{suffix}"
     extra = ["--flatten"] if flatten else []
     run("reduce", OK, "-o", rig_file, *extra)

@@ -74,7 +74,9 @@ def main() -> None:
         colour = f"C{number}"
         axes.plot(seconds, before.select([name]).values, colour, lw=1.4, label=name)
         label = f"{relation.slopes[0]:+.2f} {relation.controllers[0]} {relation.offset:+.1f}"
-        axes.plot(seconds, reduction.reduced.select([name]).values, colour, ls="--", lw=1, label=label)
+        axes.plot(
+            seconds, reduction.reduced.select([name]).values, colour, ls="--", lw=1, label=label
+        )
     axes.set_xlim(0, seconds[-1])
     axes.set_xlabel("seconds")
     axes.set_ylabel("degrees")

@@ -85,6 +85,7 @@ class _Builder:
 
 def _related(a: str, b: str) -> bool:
     """Whether two joints are next to each other (metacarpals count as the hand)."""
+
     def up(j: str) -> str | None:
         parent = PARENT[j]
         return up(parent) if parent and parent.endswith("0") else parent
@@ -152,16 +153,16 @@ def _other_side(joint: str) -> str:
     return "R" + joint[1:] if joint.startswith("L_") else joint
 
 
-
-
 def _sides(solids: list[Solid]) -> list[Solid]:
     """Left solids and their mirror images."""
     mirror = np.array([-1.0, 1.0, 1.0])
     out = list(solids)
     for s in solids:
         if s.joint.startswith("L_"):
+
             def other(p: Array, f: Distance = s.distance) -> Array:
                 return f(p * mirror)
+
             out.append(Solid(_other_side(s.joint), other, s.soft))
     return out
 

@@ -244,5 +244,3 @@ def arms_and_trunk(rig: Rig) -> list[str]:
     """Anatomical names of the joints from the hips to the wrists."""
     limbs = ("clavicle", "arm", "forearm", "hand")
     return [j for j in rig.joints if j[1] != "_" or j[2:] in limbs]
-
-

@@ -23,7 +23,7 @@ from usdhand.anatomy.angles import (
     same_signs,
     swing_twist_angles,
 )
-from usdhand.anatomy.fingertips import fingertips as fingertips
+from usdhand.anatomy.fingertips import fingertips
 from usdhand.anatomy.frames import HandFrames, hand_frames
 from usdhand.anatomy.hand import SIDE_PREFIX, SIDES, CharacterMap, Side
 from usdhand.errors import UsageError

@@ -14,9 +14,15 @@ from usdhand.motion import Clip
 
 
 def find_hands(
-    clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
+    clip: Clip,
+    conventions: Conventions | None = None,
+    sides: Sequence[Side] = SIDES,
+    others: Sequence[Clip] = (),
 ) -> Hands:
     """Find the hands of a clip's skeleton and build their anatomical frames.
+
+    ``others`` are more clips of the same skeleton: what geometry cannot decide is decided by the
+    motion of all of them.
 
     Raises
     ------
@@ -28,7 +34,7 @@ def find_hands(
     if not wanted:
         there = " and ".join(character.hands)
         raise HandNotFoundError(f"No {' or '.join(sides)} hand was found, only the {there} one.")
-    return Hands.of(clip, character, wanted)
+    return Hands.of(clip, character, wanted, others)
 
 
 def conventions_from(files: Sequence[Path]) -> Conventions | None:

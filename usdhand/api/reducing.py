@@ -92,11 +92,16 @@ def reduce_hands(
     """
     if not clips:
         raise UsageError("There is no clip to reduce.")
-    hands = [find_hands(clip, conventions, sides) for clip in clips]
+    hands = [
+        find_hands(clip, conventions, sides, [c for c in clips if _same_skeleton(c, clip)])
+        for clip in clips
+    ]
+    sources = [h.encode(clip) for clip, h in zip(clips, hands, strict=True)]
     if rig is None:
         target = reduction_target(preset, range_deg, rmsd, free_channels, max_error)
-        rig = fit_rig(clips, hands, target, fit, most_controllers)
-    return [apply_rig(rig, clip, h) for clip, h in zip(clips, hands, strict=True)]
+        rig = fit_rig(clips, hands, target, fit, most_controllers, sources)
+    each = zip(clips, hands, sources, strict=True)
+    return [apply_rig(rig, clip, h, source) for clip, h, source in each]
 
 
 def expand(path: str | Path, conventions: Conventions | None = None) -> Clip:
@@ -134,6 +139,13 @@ def write_rig(
     """Write a reduced clip as a rig over the file it was read from."""
     character = find_character(source_file(reduction.clip), reduction.clip.origin.skeleton_path)
     usd_rig.write_rig(reduction, character, Path(output), flatten=flatten, force=force)
+
+
+def _same_skeleton(a: Clip, b: Clip) -> bool:
+    """Whether two clips are of one character, so that they may share anatomical frames."""
+    return a.skeleton.joints == b.skeleton.joints and np.allclose(
+        a.skeleton.bind, b.skeleton.bind, atol=1e-4
+    )
 
 
 def _in_time_of(body: Clip, other: Clip) -> Clip:

@@ -83,7 +83,7 @@ def problems_data(problems: Sequence[Problem]) -> list[dict[str, str]]:
 def reduce_result(reduction: Reduction) -> dict[str, Any]:
     """Everything `reduce` reports of one clip."""
     rig, errors = reduction.rig, reduction.errors
-    curves = reduction.hands.encode(reduction.clip).select(rig.names).values
+    curves = reduction.source.select(rig.names).values
     over = [r.name for r in rig.relations if r.rmsd is not None and r.rmsd >= rig.rmsd_threshold]
     return {
         "clip": reduction.clip.name,
