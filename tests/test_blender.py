@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from conftest import REPOSITORY, shared_data
+
 from usdhand import api
 from usdhand.motion import forward_kinematics
 from usdhand.motion import rotations as rot
@@ -44,9 +44,8 @@ def blender_python() -> str:
 def load(path: Path, folder: Path, frames: list[float]) -> Loaded:
     target = folder / "blender.npz"
     script = REPOSITORY / "tests" / "blender_dump.py"
-    environment = {
-        k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PXR_PLUGINPATH_NAME")
-    }
+    hidden = ("PYTHONPATH", "PXR_PLUGINPATH_NAME")
+    environment = {k: v for k, v in os.environ.items() if k not in hidden}
     done = subprocess.run(
         [blender_python(), str(script), str(path), str(target), *map(str, frames)],
         capture_output=True, text=True, check=False, env=environment,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -13,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from conftest import REPOSITORY
 from pxr import Sdf, Usd, UsdSkel, Vt
 
-from conftest import REPOSITORY
 from usdhand.cli import main
 
 SAMPLES = REPOSITORY / "samples"
@@ -378,7 +377,7 @@ def test_outputs_are_protected(run: Run, tmp_path: Path) -> None:
     assert taken.read_text().startswith("#usda")
 
 
-@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="needs a folder nobody can write to")
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder nobody can write to")
 def test_a_read_only_folder_is_said(run: Run) -> None:
     assert "cannot write" in run("reduce", OK, "-o", "/proc/self/rig.usda", code=2).output
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import click
 import pytest
 from click.testing import CliRunner
-
 from conftest import REPOSITORY
+
 from usdhand.cli import main
 from usdhand.cli.main import VERBS
 

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import REPOSITORY
 from pxr import Sdf
 
-from conftest import REPOSITORY
 from usdhand import api
 from usdhand.formats.schema import schema_folder
 from usdhand.formats.usd.rig import CHANNEL_PREFIX

@@ -1,6 +1,6 @@
-"""The picture at the top of the README: one clip, its reduced rig, and the rig on another character.
+"""The picture at the top of the README: a clip, its reduced rig, the rig on another character.
 
-usage: USDHAND_BLENDER_PYTHON=PYTHON_WITH_BPY python docs/pictures/make_reduce.py   (needs matplotlib)
+usage: USDHAND_BLENDER_PYTHON=PYTHON_WITH_BPY python docs/pictures/make_reduce.py (and matplotlib)
 """
 
 import json
@@ -25,6 +25,7 @@ CHANNELS = ("riRingMCPy", "riMiddlePIPy")
 
 
 def main() -> None:
+    """Reduce, expand, render and plot."""
     folder = Path(tempfile.mkdtemp())
     clip = api.read_clip(CLIP)
     [reduction] = api.reduce_hands([clip])
@@ -74,9 +75,8 @@ def main() -> None:
         colour = f"C{number}"
         axes.plot(seconds, before.select([name]).values, colour, lw=1.4, label=name)
         label = f"{relation.slopes[0]:+.2f} {relation.controllers[0]} {relation.offset:+.1f}"
-        axes.plot(
-            seconds, reduction.reduced.select([name]).values, colour, ls="--", lw=1, label=label
-        )
+        after = reduction.reduced.select([name]).values
+        axes.plot(seconds, after, colour, ls="--", lw=1, label=label)
     axes.set_xlim(0, seconds[-1])
     axes.set_xlabel("seconds")
     axes.set_ylabel("degrees")

@@ -1,7 +1,7 @@
 """Runs inside Blender's Python: render shots of USD characters.
 
-usage: python render.py SHOTS.json, a list of {file, frame, hand, scale, out}; "hand" names the bones of the
-wrist, middle, index and little finger, so that every hand is seen from the same side of its palm.
+usage: python render.py SHOTS.json, a list of {file, frame, hand, scale, out}; "hand" names the
+bones of the wrist, middle, index and little finger, so that every hand is seen from its palm.
 """
 
 import json

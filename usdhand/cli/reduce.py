@@ -222,7 +222,7 @@ def _rig_text(reduction: Reduction, result: dict[str, Any], verbose: bool) -> st
         "free: " + (" ".join(rig.free) or "none"),
     ]
     if over := result["followed_to_root_over_threshold"]:
-        lines.append(f"{len(over)} follow a chain to a root beyond the threshold: {' '.join(over)}")
+        lines.append(f"{len(over)} follow a root beyond the threshold: {' '.join(over)}")
     if verbose:
         head = ["channel", "kind", "follows", "slope", "rmsd", "RMS deg", "max deg"]
         rows = [
