@@ -243,9 +243,10 @@ def _rig_text(reduction: Reduction, result: dict[str, Any], verbose: bool) -> st
 
 def _error_text(result: dict[str, Any]) -> str:
     tips, total = result["fingertip_error_mm"], result["total_error"]["fingertip_error_mm"]
+    rms, largest = result["rms_error_deg"], result["max_error_deg"]
     return (
         f"{result['clip']}\n"
-        f"  reduction: RMS {result['rms_error_deg']:.2f} deg, max {result['max_error_deg']:.1f} deg; "
+        f"  reduction: RMS {rms:.2f} deg, max {largest:.1f} deg; "
         f"fingertips mean {tips['mean']:.1f} mm, max {tips['max']:.1f} mm "
         f"(PCA of the same size: RMS {result['pca_rms_error_deg']:.2f} deg)\n"
         f"  with the {len(result['held_channels'])} angles outside the model held: fingertips mean "
