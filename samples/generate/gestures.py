@@ -19,6 +19,8 @@ from .motion import TRUNK, Score, arm_target
 GESTURES = (
     "attention", "big", "doubt_shrug", "ok", "palm_presentation", "small", "turn", "wipe",
 )  # fmt: skip
+# How differently wrists turn in the same gesture, radians: enough that no single feature tells all.
+WRIST_WOBBLE = 0.15
 TWO_HANDED = ("big", "doubt_shrug", "small")
 
 
@@ -125,7 +127,7 @@ def stages(body: Body, gesture: str, v: Variation) -> list[Stage]:
     def aim(out: float, up: float, ahead: float, u: Vector, n: Vector,
             swivel: float = 0.0) -> Array:  # fmt: skip
         wrist = np.array([out, up, ahead]) + rng.normal(0, 0.01, 3)
-        wobble = rng.normal(0, 0.05, (2, 3))
+        wobble = rng.normal(0, WRIST_WOBBLE, (2, 3))
         return arm_target(body, wrist, np.array(u) + wobble[0], np.array(n) + wobble[1], swivel)
 
     def both(value: Array, shift: float = 0.012) -> dict[str, Array]:
@@ -329,8 +331,8 @@ def variations(gesture: str, count: int, seed: int) -> list[Variation]:
     for i in range(count):
         v = Variation(
             pace=float((0.70, 1.03)[i % 2] * rng.uniform(0.93, 1.07)),
-            height=float((-0.8, 0.8)[i // 2 % 2] + rng.uniform(-0.2, 0.2)),
-            distance=float((-0.7, 0.7)[i // 4 % 2] + rng.uniform(-0.3, 0.3)),
+            height=float((-0.5, 0.5)[i // 2 % 2] + rng.uniform(-0.2, 0.2)),
+            distance=float((-0.5, 0.5)[i // 4 % 2] + rng.uniform(-0.3, 0.3)),
             amplitude=float(rng.uniform(0.7, 1.3)),
             hands=usual,
             hold=float(rng.uniform(0.35, 0.65)),
