@@ -5,35 +5,28 @@ The functions are the verbs of the command line, on values: see `usdhand.api`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from usdhand.version import __version__
-
-if TYPE_CHECKING:
-    from usdhand.api import (
-        apply_rig,
-        check_file,
-        compare,
-        expand,
-        find_hands,
-        read_clip,
-        read_rig,
-        reduce_hands,
-        write_clip,
-        write_rig,
-    )
 
 __all__ = [
     "__version__",
     "apply_rig",
+    "build_library",
     "check_file",
     "compare",
+    "conventions_from",
     "expand",
+    "expand_onto",
+    "fill_fingers",
     "find_hands",
     "read_clip",
+    "read_library",
     "read_rig",
     "reduce_hands",
     "write_clip",
+    "write_filled",
+    "write_library",
     "write_rig",
 ]
 

@@ -85,7 +85,7 @@ _PHALANGES = {
 _THUMB_BASE = (2.0, 1.9, 0.7)
 _THUMB_RADIAL, _THUMB_PALMAR = 45.0, 20.0
 # How far the plane in which the thumb bends is turned from the fingers' plane, at rest.
-_THUMB_ROLL = 50.0
+_THUMB_ROLL = 20.0
 
 
 def _parents() -> dict[str, str | None]:

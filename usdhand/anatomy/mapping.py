@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 from usdhand.anatomy import geometry
@@ -63,11 +63,33 @@ def _with_explicit(
         if side in tables:
             named = {role: _lookup(rig, side, role, j) for role, j in tables[side].items()}
             hands[side] = _amended(hands.get(side), side, named)
+            _check_named(rig, hands[side])
+    _check_apart(rig, hands)
     body: dict[str, Any] = {
         r: _lookup(rig, "body", r, j) for r, j in tables.get("body", {}).items()
     }
     notes = (*found.notes, "joints taken from the map file")
     return replace(found, hands=hands, notes=notes, **body)
+
+
+def _check_named(rig: Rig, hand: HandMap) -> None:
+    """Refuse a digit whose joints stand in the wrong order: a map file has them mixed up."""
+    for digit in hand.digits:
+        chain = [name for name in HAND_JOINTS if name.startswith(digit) and name in hand.joints]
+        for above, below in pairwise(chain):
+            if hand.joints[below] in rig.skeleton.ancestors(hand.joints[above]):
+                raise HandNotFoundError(
+                    f"map file, [{hand.side}]: {below} '{rig.path(hand.joints[below])}' is "
+                    f"above {above} '{rig.path(hand.joints[above])}'"
+                )
+
+
+def _check_apart(rig: Rig, hands: Mapping[Side, HandMap]) -> None:
+    """Refuse a joint that is said to be in both hands."""
+    of_side = [{h.wrist, *h.joints.values()} for h in hands.values()]
+    shared = set.intersection(*of_side) if len(of_side) == len(SIDES) else set()
+    if shared:
+        raise HandNotFoundError(f"map file: '{rig.path(min(shared))}' is named for both hands")
 
 
 def _lookup(rig: Rig, table: str, role: str, name: str) -> int:

@@ -9,35 +9,40 @@ Example
 >>> usdhand.write_rig(reduction, "ok_rig.usdc")                # doctest: +SKIP
 """
 
-from usdhand.api.clips import compare, conventions_from, find_hands, write_clip
-from usdhand.api.reducing import (
-    expand,
-    expand_onto,
-    read_rig,
-    reduce_hands,
-    reduction_target,
-    write_rig,
-)
-from usdhand.compare import Comparison
-from usdhand.formats.usd.check import Finding, check_file
-from usdhand.formats.usd.read import read_character, read_clip
-from usdhand.reduce import apply_rig
+from __future__ import annotations
 
-__all__ = [
-    "Comparison",
-    "Finding",
-    "apply_rig",
-    "check_file",
-    "compare",
-    "conventions_from",
-    "expand",
-    "expand_onto",
-    "find_hands",
-    "read_character",
-    "read_clip",
-    "read_rig",
-    "reduce_hands",
-    "reduction_target",
-    "write_clip",
-    "write_rig",
-]
+import importlib
+from typing import Any
+
+# Name -> module; each is imported when it is first used, since methods and USD take their time.
+_HOME = {
+    "Comparison": "usdhand.compare",
+    "Finding": "usdhand.formats.usd.findings",
+    "apply_rig": "usdhand.reduce",
+    "build_library": "usdhand.api.filling",
+    "check_file": "usdhand.formats.usd.check",
+    "compare": "usdhand.api.clips",
+    "conventions_from": "usdhand.api.clips",
+    "expand": "usdhand.api.reducing",
+    "expand_onto": "usdhand.api.reducing",
+    "fill_fingers": "usdhand.api.filling",
+    "find_hands": "usdhand.api.clips",
+    "read_character": "usdhand.formats.usd.read",
+    "read_clip": "usdhand.formats.usd.read",
+    "read_library": "usdhand.api.filling",
+    "read_rig": "usdhand.api.reducing",
+    "reduce_hands": "usdhand.api.reducing",
+    "reduction_target": "usdhand.api.reducing",
+    "write_clip": "usdhand.api.clips",
+    "write_filled": "usdhand.api.filling",
+    "write_library": "usdhand.api.filling",
+    "write_rig": "usdhand.api.reducing",
+}
+
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'usdhand.api' has no attribute '{name}'")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from usdhand.anatomy import SIDES, Conventions, Hands, Side, load_conventions, map_character
 from usdhand.compare import Comparison, compare_clips
-from usdhand.errors import HandNotFoundError, InputError
+from usdhand.errors import HandNotFoundError, InputError, UsageError
 from usdhand.formats.usd.stage import find_character
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
@@ -29,12 +29,18 @@ def find_hands(
     HandNotFoundError
         if there is no hand, or an ambiguous one, or none on the wanted side.
     """
-    character = map_character(clip.skeleton, conventions)
-    wanted = [side for side in sides if side in character.hands]
-    if not wanted:
-        there = " and ".join(character.hands)
-        raise HandNotFoundError(f"No {' or '.join(sides)} hand was found, only the {there} one.")
-    return Hands.of(clip, character, wanted, others)
+    name = clip.origin.path or clip.name
+    if unknown := set(sides) - set(SIDES):
+        raise UsageError(f"There is no side '{min(unknown)}'; sides are {' and '.join(SIDES)}.")
+    try:
+        character = map_character(clip.skeleton, conventions)
+        wanted = [side for side in sides if side in character.hands]
+        if not wanted:
+            there = " and ".join(character.hands)
+            raise HandNotFoundError(f"no {' or '.join(sides)} hand, only the {there} one")
+        return Hands.of(clip, character, wanted, others)
+    except HandNotFoundError as error:
+        raise HandNotFoundError(f"{name}: {error}") from error
 
 
 def conventions_from(files: Sequence[Path]) -> Conventions | None:

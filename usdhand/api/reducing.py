@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -92,6 +93,8 @@ def reduce_hands(
     """
     if not clips:
         raise UsageError("There is no clip to reduce.")
+    if fit not in get_args(Fit):
+        raise UsageError(f"There is no fit '{fit}'; there are {' and '.join(get_args(Fit))}.")
     hands = [
         find_hands(clip, conventions, sides, [c for c in clips if _same_skeleton(c, clip)])
         for clip in clips
@@ -104,9 +107,14 @@ def reduce_hands(
     return [apply_rig(rig, clip, h, source) for clip, h, source in each]
 
 
-def expand(path: str | Path, conventions: Conventions | None = None) -> Clip:
-    """Motion of a rig file: dependent channels computed from its free ones."""
-    stored = usd_rig.read_stored_rig(path)
+def expand(
+    path: str | Path, conventions: Conventions | None = None, skel: str | None = None
+) -> Clip:
+    """Motion of a rig file: dependent channels computed from its free ones.
+
+    ``skel`` chooses a rig by its skeleton where the file has several.
+    """
+    stored = usd_rig.read_stored_rig(path, skel)
     hands = usd_rig.with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
     return expand_channels(stored.rig, stored.free, stored.clip, hands)
 
@@ -128,9 +136,12 @@ def expand_onto(
     return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
 
 
-def read_rig(path: str | Path) -> ReducedRig:
-    """Read the relations of a rig file, to apply them to other clips."""
-    return usd_rig.read_rig(path)
+def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
+    """Read the relations of a rig file, to apply them to other clips.
+
+    ``skel`` chooses a rig by its skeleton where the file has several.
+    """
+    return usd_rig.read_rig(path, skel)
 
 
 def write_rig(

@@ -8,13 +8,13 @@ from typing import Any
 import click
 
 from usdhand.cli.common import (
+    fail,
     files_argument,
     find_files,
     json_option,
     quiet_option,
     say,
     skel_option,
-    warn,
     with_progress,
 )
 
@@ -28,7 +28,7 @@ from usdhand.cli.common import (
 def command(
     files: tuple[str, ...], skel: str | None, as_json: bool, quiet: bool, strict: bool
 ) -> None:
-    r"""Check files with UsdValidation and rules of our own.
+    """Check files with UsdValidation and rules of our own.
 
     Finds what validators miss and tools stumble on: joint names that are no legal prim names,
     missing bind, rest or scales, time codes that would be rescaled. Exit 1 if there is an error.
@@ -49,7 +49,7 @@ def command(
         try:
             result = check_result(check_file(path, skel))
         except UsdHandError as error:
-            warn(str(error), quiet)
+            fail(error)
             results.append({"path": str(path), "ok": False, "error": str(error)})
             code = max(code, error.exit_code)
             continue

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from usdhand.errors import UsageError
+from usdhand.errors import InputError, UsageError
 
 if TYPE_CHECKING:
+    from usdhand.errors import UsdHandError
     from usdhand.motion import Clip
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -78,6 +79,13 @@ def find_files(arguments: Iterable[str], suffixes: Sequence[str] = USD_PATTERNS)
     UsageError
         if a wildcard matches nothing or a folder holds no such file.
     """
+    try:
+        return _found(arguments, suffixes)
+    except OSError as error:
+        raise InputError(f"{error.filename}: cannot be read ({error.strerror}).") from error
+
+
+def _found(arguments: Iterable[str], suffixes: Sequence[str]) -> list[Path]:
     found: dict[Path, None] = {}
     for argument in arguments:
         path = Path(argument)
@@ -113,6 +121,11 @@ def warn(text: str, quiet: bool = False) -> None:
         click.echo(f"Warning: {text}", err=True)
 
 
+def fail(error: UsdHandError) -> None:
+    """Print an error of one file of several; the command goes on and keeps its exit code."""
+    click.echo(f"Error: {error}", err=True)
+
+
 def warn_of(clip: Clip, quiet: bool) -> None:
     """Print what is odd about a clip that was read."""
     for problem in clip.problems:
@@ -122,10 +135,13 @@ def warn_of(clip: Clip, quiet: bool) -> None:
 
 def with_progress(items: Sequence[Any], label: str) -> Iterator[Any]:
     """Yield items with a progress bar, if there are many and someone is watching."""
+    if len(items) < 3:
+        yield from items
+        return
     from rich.console import Console
 
     console = Console(stderr=True)
-    if len(items) < 3 or not console.is_terminal:
+    if not console.is_terminal:
         yield from items
         return
     from rich.progress import track
@@ -133,13 +149,21 @@ def with_progress(items: Sequence[Any], label: str) -> Iterator[Any]:
     yield from track(items, description=label, console=console, transient=True)
 
 
+def check_report(path: Path | None, force: bool) -> None:
+    """Refuse a report before any work is done."""
+    if path is not None:
+        from usdhand.formats.output import check_output
+
+        check_output(path, (), force, (".json",))
+
+
 def write_report(path: Path | None, text: str, force: bool) -> None:
     """Write a JSON report, whole or not at all."""
     if path is None:
         return
-    from usdhand.formats.output import check_output, written_beside
+    from usdhand.formats.output import written_beside
 
-    check_output(path, (), force, (".json",))
+    check_report(path, force)
     with written_beside(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from usdhand.cli.common import (
+    check_report,
     json_option,
     map_option,
     quiet_option,
@@ -28,6 +29,7 @@ from usdhand.cli.common import (
     "--max-rms", type=float, metavar="DEG", help="Exit 5 if the RMS over channels is larger."
 )
 @skel_option
+@click.option("--skel-b", metavar="PRIM", help="Skeleton of B, if it is another one.")
 @map_option
 @report_option
 @click.option("--force", is_flag=True, help="Replace a report that exists.")
@@ -40,6 +42,7 @@ def command(
     align: bool,
     max_rms: float | None,
     skel: str | None,
+    skel_b: str | None,
     maps: tuple[Path, ...],
     report: Path | None,
     force: bool,
@@ -47,7 +50,7 @@ def command(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    r"""Compare motion B with motion A: degrees, fingertips, smoothness, lag.
+    """Compare motion B with motion A: degrees, fingertips, smoothness, lag.
 
     Characters may differ: hands are compared by anatomical channels, fingertips in the palm's
     axes. Both are taken from their first frame on, at A's frame rate.
@@ -61,10 +64,11 @@ def command(
     from usdhand.report.document import document, dumps
     from usdhand.report.results import compare_result
 
+    check_report(report, force)
     conventions = api.conventions_from(maps)
-    clips = [api.read_clip(path, skel) for path in (a, b)]
+    clips = [api.read_clip(a, skel), api.read_clip(b, skel_b or skel)]
     comparison = api.compare(*clips, align=align, conventions=conventions)
-    settings = {"align": align, "skel": skel, "max_rms": max_rms}
+    settings = {"align": align, "skel": skel, "skel_b": skel_b, "max_rms": max_rms}
     result = compare_result(comparison)
     text = dumps(document("compare", [a, b, *maps], settings, result))
     write_report(report, text, force)

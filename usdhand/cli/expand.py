@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from usdhand.cli.common import (
+    check_report,
     dry_run_option,
     flatten_option,
     force_option,
@@ -52,7 +53,7 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    r"""Turn a reduced rig back into motion, on its own or another character.
+    """Turn a reduced rig back into motion, on its own or another character.
 
     Dependent channels are computed from the free ones (also after someone edited those) and
     baked, with the body, into a SkelAnimation.
@@ -70,10 +71,10 @@ def command(
 
     conventions = api.conventions_from(maps)
     inputs = [rig] if onto is None else [rig, onto]
-    if not dry_run:
-        check_output(output, inputs, force, USD_SUFFIXES)
+    check_output(output, inputs, force, USD_SUFFIXES)
+    check_report(report, force)
     if onto is None:
-        motion = api.expand(rig, conventions)
+        motion = api.expand(rig, conventions, skel)
     else:
         motion = api.expand_onto(rig, onto, skel, conventions)
     warn_of(motion, quiet)
@@ -85,7 +86,7 @@ def command(
         "output": None if dry_run else str(output),
         "frames": len(motion),
         "fps": motion.fps,
-        "free_channels": len(api.read_rig(rig).free),
+        "free_channels": len(api.read_rig(rig, None if onto else skel).free),
         "problems": problems_data(motion.problems),
     }
     settings = {"onto": onto, "skel": skel, "flatten": flatten}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from usdhand.cli.common import (
+    fail,
     files_argument,
     find_files,
     json_option,
@@ -17,7 +18,6 @@ from usdhand.cli.common import (
     skel_option,
     table,
     verbose_option,
-    warn,
 )
 
 if TYPE_CHECKING:
@@ -39,18 +39,18 @@ def command(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    r"""Show skeletons, timing, units, hands and problems of files.
+    """Show skeletons, timing, units, hands and problems of files.
 
     \b
     Example:
       usdhand inspect samples/characters samples/gestures/ok_01.usdc
     """
-    from usdhand import api
-    from usdhand.errors import UsdHandError
+    from usdhand.api.clips import conventions_from
+    from usdhand.errors import HandNotFoundError, UsdHandError
     from usdhand.report.document import document, dumps
 
     paths = find_files(files)
-    conventions = api.conventions_from(maps)
+    conventions = conventions_from(maps)
     results, code = [], 0
     for path in paths:
         result: dict[str, Any] = {"path": str(path)}
@@ -59,10 +59,12 @@ def command(
         except UsdHandError as error:
             result["error"] = str(error)
             code = max(code, error.exit_code)
-            warn(str(error), as_json)
+            fail(error)
         else:
             if "hand_error" in result:
                 code = max(code, 4)
+                if quiet or as_json:
+                    fail(HandNotFoundError(result["hand_error"]))
             if not as_json:
                 say(_text(result, verbose), quiet)
         results.append(result)
@@ -72,7 +74,7 @@ def command(
 
 
 def _inspect(path: Path, skel: str | None, conventions: Conventions | None) -> dict[str, Any]:
-    from usdhand.api import find_hands
+    from usdhand.api.clips import find_hands
     from usdhand.errors import HandNotFoundError
     from usdhand.formats.usd.read import bind_pose_clip, clip_from_character
     from usdhand.formats.usd.stage import find_character

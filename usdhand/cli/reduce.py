@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from usdhand.cli.common import (
+    check_report,
     dry_run_option,
     files_argument,
     find_files,
@@ -101,7 +102,7 @@ def command(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    r"""Reduce hands to a rig of a few free channels.
+    """Reduce hands to a rig of a few free channels.
 
     Finds which finger rotations barely move and which follow others linearly (Joerg & O'Sullivan
     2009), over all clips together, and writes the rig as custom attributes over each clip, with
@@ -115,6 +116,7 @@ def command(
     """
     from usdhand import api
     from usdhand.errors import UsageError
+    from usdhand.formats.output import make_folder
     from usdhand.report.document import document, dumps
     from usdhand.report.results import reduce_result
 
@@ -140,9 +142,12 @@ def command(
     ]
     if rig_file is not None and asked:
         raise UsageError(f"--rig applies a rig as it is; --{asked[0].replace('_', '-')} fits one.")
+    if rig_file is not None and (fit != "paper" or controllers > 1):
+        raise UsageError("--rig applies a rig as it is; --fit and --controllers are for fitting.")
     api.reduction_target(preset, range_deg, rmsd, target_dofs, max_error)
-    if not dry_run:
-        _check_outputs(outputs, [*paths, *([rig_file] if rig_file else [])], force)
+    inputs = [*paths, *([rig_file] if rig_file else []), *maps]
+    _check_outputs(outputs, inputs, force)
+    check_report(report, force)
 
     conventions = api.conventions_from(maps)
     rig = api.read_rig(rig_file) if rig_file else None
@@ -173,6 +178,7 @@ def command(
     whole = results[0] if len(results) == 1 else {"clips": results}
     text = dumps(document("reduce", inputs, settings, whole))
     if not dry_run:
+        make_folder(outputs[0].parent)
         for reduction, target in with_progress(
             list(zip(reductions, outputs, strict=True)), "writing"
         ):
@@ -197,16 +203,15 @@ def _outputs(paths: list[Path], output: Path) -> list[Path]:
 
 def _check_outputs(outputs: list[Path], inputs: list[Path], force: bool) -> None:
     from usdhand.errors import OutputError
-    from usdhand.formats.output import check_output
+    from usdhand.formats.output import check_folder, check_output
     from usdhand.formats.usd.stage import USD_SUFFIXES
 
     if len(set(outputs)) < len(outputs):
         raise OutputError("Two clips have the same name, so their rigs would replace each other.")
-    if len(outputs) > 1:
-        folder = outputs[0].parent
-        if folder.exists() and not folder.is_dir():
-            raise OutputError(f"{folder} is a file; several clips need a folder.")
-        folder.mkdir(parents=True, exist_ok=True)
+    folder = outputs[0].parent
+    if len(outputs) > 1 and not folder.exists():  # made once there is something to put in
+        check_folder(folder)
+        return
     for path in outputs:
         check_output(path, inputs, force, USD_SUFFIXES)
 

@@ -7,7 +7,7 @@ import click
 
 @click.command("schema")
 def command() -> None:
-    r"""Print the folder of the USD schema for PXR_PLUGINPATH_NAME.
+    """Print the folder of the USD schema for PXR_PLUGINPATH_NAME.
 
     Rigs read the same without it; with it, USD tools show the types of a rig.
 

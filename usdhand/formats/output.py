@@ -36,6 +36,38 @@ def check_output(
     folder = output.absolute().parent
     if not folder.is_dir():
         raise OutputError(f"{folder}: no such folder to write {output.name} to.")
+    _check_writable(folder)
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse an output folder that cannot be made, before any work is done.
+
+    Raises
+    ------
+    OutputError
+        if its nearest existing parent is a file or read-only.
+    """
+    parent = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
+    if not parent.is_dir():
+        raise OutputError(f"{parent} is a file; several outputs need a folder.")
+    _check_writable(parent)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and its parents, if they are not there.
+
+    Raises
+    ------
+    OutputError
+        if that is not possible.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made ({error.strerror}).") from error
+
+
+def _check_writable(folder: Path) -> None:
     try:
         # Not os.access: it tells nothing for root, nor on network drives.
         with tempfile.TemporaryFile(dir=folder):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,8 @@ from usdhand.formats.usd.world import world_above
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+
+VARIANT_SET = "fingers"
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +110,29 @@ def author_animation(
         spec = attribute.path
         for time, row in zip(times.tolist(), rows, strict=True):
             layer.SetTimeSample(spec, time, convert(row))
+    return times
+
+
+def author_variants(
+    layer: Sdf.Layer,
+    path: Sdf.Path,
+    character: Character,
+    clips: Mapping[str, Clip],
+    changed: Sequence[int],
+) -> Array:
+    """Define a SkelAnimation with a motion a variant, and return the time codes.
+
+    All values are inside the variants, since a local opinion would win over them.
+    """
+    prim = Sdf.CreatePrimInLayer(layer, path)
+    prim.specifier = Sdf.SpecifierDef
+    prim.typeName = "SkelAnimation"
+    prim.variantSetNameList.prependedItems = [VARIANT_SET]
+    variants = Sdf.VariantSetSpec(prim, VARIANT_SET)
+    for name, clip in clips.items():
+        inside = Sdf.VariantSpec(variants, name).primSpec.path
+        times = author_animation(layer, inside, character, clip, changed)
+    prim.variantSelections[VARIANT_SET] = next(iter(clips))
     return times
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from pxr import Sdf, Usd, UsdValidation
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdValidation
 
 from usdhand.formats.usd.check_animation import animation_findings
 from usdhand.formats.usd.check_skeleton import skeleton_findings
@@ -13,6 +14,7 @@ from usdhand.formats.usd.findings import Finding, Severity
 from usdhand.formats.usd.rig import rig_findings
 from usdhand.formats.usd.stage import (
     choose_skeleton,
+    damage_refused,
     find_skeletons,
     open_stage,
     usd_diagnostics,
@@ -46,13 +48,14 @@ def check_file(path: str | Path, skel: str | None = None) -> tuple[Finding, ...]
     """
     path = Path(path)
     stage, _ = open_stage(path)
-    with usd_diagnostics():
+    with usd_diagnostics(), damage_refused(path):
         found = dict.fromkeys(_stage_findings(path, stage, skel))
     return tuple(sorted(found, key=lambda finding: finding.severity != "error"))
 
 
 def _stage_findings(path: Path, stage: Usd.Stage, skel: str | None) -> Iterator[Finding]:
     yield from validator_findings(stage)
+    yield from unit_findings(stage)
     yield from rate_findings(stage)
     yield from rig_findings(stage, path)
     skeletons = find_skeletons(stage)
@@ -73,6 +76,17 @@ def validator_findings(stage: Usd.Stage) -> Iterator[Finding]:
         )
         where = ", ".join(_site_name(site) for site in error.GetSites())
         yield Finding(severity, str(error.GetIdentifier()), error.GetMessage(), where)
+
+
+def unit_findings(stage: Usd.Stage) -> Iterator[Finding]:
+    """Stage metadata that can be no unit or rate."""
+    for name, value in (
+        ("timeCodesPerSecond", stage.GetTimeCodesPerSecond()),
+        ("metersPerUnit", UsdGeom.GetStageMetersPerUnit(stage)),
+    ):
+        if not 0.0 < value < np.inf:
+            where = stage.GetRootLayer().identifier
+            yield Finding("error", "bad-unit", f"{name} is {value:g}: it must be above 0", where)
 
 
 def rate_findings(stage: Usd.Stage) -> Iterator[Finding]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel
+from pxr import Gf, Usd, UsdGeom, UsdSkel
 
 from usdhand.formats.usd.findings import Finding, Severity
+from usdhand.formats.usd.names import illegal_names, legal_name
 from usdhand.formats.usd.poses import MISPLACED_BIND_CM
 from usdhand.formats.usd.world import world_problems
 from usdhand.motion import leaf_name, parents_from_paths
@@ -34,15 +34,8 @@ def skeleton_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
         yield Finding(severity, problem.code, problem.message, problem.where)
 
 
-def legal_name(name: str) -> str:
-    """Nearest name that USD takes as a prim: ``mixamorig:Hips`` -> ``mixamorig_Hips``."""
-    legal = re.sub(r"\W", "_", name)
-    return legal if legal and not legal[0].isdigit() else f"_{legal}"
-
-
 def _name_findings(joints: Sequence[str], where: str) -> Iterator[Finding]:
-    names = dict.fromkeys(part for joint in joints for part in joint.split("/"))
-    illegal = [name for name in names if not Sdf.Path.IsValidIdentifier(name)]
+    illegal = illegal_names(joints)
     if illegal:
         renamed = [f"'{name}' to '{legal_name(name)}'" for name in illegal]
         yield Finding(

@@ -20,13 +20,17 @@ from usdhand.formats.usd.curves import (
     joint_targets,
     read_curve,
 )
+from usdhand.formats.usd.names import illegal_names, legal_name
 from usdhand.formats.usd.poses import AuthoredPoses, authored_poses, local_matrices, placed_skeleton
 from usdhand.formats.usd.samples import Track, steady
-from usdhand.formats.usd.stage import Character, find_character
+from usdhand.formats.usd.stage import Character, damage_refused, find_character
 from usdhand.formats.usd.world import World, world_above, world_problems
 from usdhand.motion import Clip, Origin, Problem, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+
+# Rates that a file may mean; beyond, its time codes are something else.
+SLOWEST_FPS, FASTEST_FPS = 0.1, 10_000.0
 
 
 def read_clip(path: str | Path, skel: str | None = None) -> Clip:
@@ -62,6 +66,17 @@ def read_character(path: str | Path, skel: str | None = None) -> Clip:
 
 def clip_from_character(character: Character) -> Clip:
     """Read the motion of a character that was found on a stage; see `read_clip`."""
+    with damage_refused(character.path):
+        return _animated_clip(character)
+
+
+def bind_pose_clip(character: Character) -> Clip:
+    """Return one frame of a character at its bind pose, whether it is animated or not."""
+    with damage_refused(character.path):
+        return _still_clip(character)
+
+
+def _animated_clip(character: Character) -> Clip:
     if character.animation is None:
         raise InputError(
             f"{character.path}: no animation is bound to {character.skeleton.GetPath()}. "
@@ -89,6 +104,7 @@ def clip_from_character(character: Character) -> Clip:
     )
     problems = (
         *character.problems,
+        *_name_problems(character, joints),
         *world_problems(character.skeleton, times),
         *_animation_problems(animation, joints, targets, tracks),
         *missing,
@@ -96,11 +112,15 @@ def clip_from_character(character: Character) -> Clip:
         *repaired,
     )
     fps = origin.time_codes_per_second / step
+    if not SLOWEST_FPS <= fps <= FASTEST_FPS:
+        raise InputError(
+            f"{character.path}: {fps:g} frames a second cannot be meant; check timeCodesPerSecond "
+            f"({origin.time_codes_per_second:g})."
+        )
     return Clip(skeleton, q, t, scales, fps, character.path.stem, origin, problems)
 
 
-def bind_pose_clip(character: Character) -> Clip:
-    """Return one frame of a character at its bind pose, whether it is animated or not."""
+def _still_clip(character: Character) -> Clip:
     joints = _joints(character)
     parents = parents_from_paths(joints)
     world = world_above(character.skeleton)
@@ -110,7 +130,13 @@ def bind_pose_clip(character: Character) -> Clip:
         rot.from_matrix(local[None, :, :3, :3]), local[None, :, :3, 3].copy(), parents, world
     )
     skeleton, repaired = placed_skeleton(joints, parents, poses, world, local_matrices(q[0], t[0]))
-    problems = (*character.problems, *world_problems(character.skeleton), *missing, *repaired)
+    problems = (
+        *character.problems,
+        *_name_problems(character, joints),
+        *world_problems(character.skeleton),
+        *missing,
+        *repaired,
+    )
     origin = _origin(character, world)
     fps = origin.time_codes_per_second
     return Clip(skeleton, q, t, np.ones_like(t), fps, character.path.stem, origin, problems)
@@ -187,6 +213,16 @@ def _animation_problems(
                 "all the same"
             )
             yield Problem(f"missing-{name}", message, where)
+
+
+def _name_problems(character: Character, joints: tuple[str, ...]) -> Iterator[Problem]:
+    illegal = illegal_names(joints)
+    if illegal:
+        message = (
+            f"{len(illegal)} joint names are no legal USD names, e.g. '{illegal[0]}': other "
+            f"programs may lose these joints; '{legal_name(illegal[0])}' would be legal"
+        )
+        yield Problem("illegal-joint-name", message, str(character.skeleton.GetPath()))
 
 
 def _origin(character: Character, world: World) -> Origin:

@@ -12,23 +12,26 @@ from pxr import Sdf, Usd, UsdSkel, Vt
 
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.anatomy.frames import HandFrames
-from usdhand.anatomy.hand import SIDES, Side
+from usdhand.anatomy.hand import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError
-from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.findings import Finding
 from usdhand.formats.usd.read import clip_from_character
-from usdhand.formats.usd.stage import Character, find_character, open_stage
-from usdhand.formats.usd.write import write_motion
+from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, VERSION, author_rig
+from usdhand.formats.usd.stage import (
+    Character,
+    damage_refused,
+    find_character,
+    open_stage,
+)
+from usdhand.formats.usd.write import free_child, write_motion
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.reduce import ReducedRig, Reduction, Relation
 from usdhand.reduce.rig import Kind, evaluation_order
 
 RIG_NAME = "HandRig"
-VERSION = 1
-CHANNEL_PREFIX = "usdhand:channel"
-HELD = "held"
-_TYPES = Sdf.ValueTypeNames
+LARGEST = 1e6  # degrees, or anything else a rig counts: more cannot be meant
+UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +82,16 @@ def write_rig(
     Raises the errors of `write_motion`.
     """
     frames = reduction.hands.frames.values()
+    skeleton = reduction.clip.origin.skeleton_path
+    stage = character.stage
+    old = [p.GetPath() for p in rig_prims(stage) if _skeleton_path(p) in (skeleton, None)]
+
+    def author(layer: Sdf.Layer, root: Sdf.Path) -> None:
+        # A rig that the input has would shine through the new one: it is put aside.
+        for path in old:
+            Sdf.CreatePrimInLayer(layer, path).SetInfo("active", False)
+        author_rig(layer, free_child(stage, root, RIG_NAME), reduction)
+
     write_motion(
         character,
         reduction.motion,
@@ -86,162 +99,93 @@ def write_rig(
         output,
         flatten=flatten,
         force=force,
-        author=lambda layer, root: _author_rig(layer, root.AppendChild(RIG_NAME), reduction),
+        author=author,
     )
 
 
-def read_rig(path: str | Path) -> ReducedRig:
+def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
     """Read the relations of a rig file, without its motion.
+
+    ``skel`` chooses by the skeleton where a stage has rigs of several characters.
 
     Raises
     ------
     InputError
         if the file holds no rig, or one that contradicts itself.
     """
-    stage, _ = open_stage(Path(path))
-    return _relations(find_rig(stage, Path(path)), Path(path))
+    path = Path(path)
+    stage, _ = open_stage(path)
+    with damage_refused(path):
+        return _relations(find_rig(stage, path, skel), path)
 
 
 def read_stored_rig(path: str | Path, skel: str | None = None) -> StoredRig:
-    """Read a rig file with the curves of its free channels and its character."""
+    """Read a rig file with the curves of its free channels and its character; see `read_rig`."""
     path = Path(path)
     stage, _ = open_stage(path)
-    prim = find_rig(stage, path)
-    rig = _relations(prim, path)
-    character = find_character(path, skel or _skeleton_path(prim))
-    clip = clip_from_character(character)
-    curves = [_curve(prim, name, clip.time_codes, path) for name in rig.free]
-    values = np.stack(curves, axis=1) if curves else np.empty((len(clip), 0))
-    return StoredRig(rig, Channels(rig.free, values), character, clip, _stored_frames(prim))
+    with damage_refused(path):
+        prim = find_rig(stage, path, skel)
+        rig = _relations(prim, path)
+        skeleton = _skeleton_path(prim)
+        if skeleton is None:
+            raise InputError(f"{path}: the skeleton of the rig {prim.GetPath()} is not there.")
+        character = find_character(path, skeleton)
+        clip = clip_from_character(character)
+        curves = [_curve(prim, name, clip.time_codes, path) for name in rig.free]
+        values = np.stack(curves, axis=1) if curves else np.empty((len(clip), 0))
+        frames = _stored_frames(prim, path)
+    return StoredRig(rig, Channels(rig.free, values), character, clip, frames)
 
 
-def find_rig(stage: Usd.Stage, path: Path) -> Usd.Prim:
-    """The rig prim of a stage.
+def find_rig(stage: Usd.Stage, path: Path, skel: str | None = None) -> Usd.Prim:
+    """The rig prim of a stage; see `read_rig`.
 
     Raises
     ------
     InputError
-        if there is none, or more than one.
+        if there is none, or more than one to choose from.
     """
     rigs = list(rig_prims(stage))
+    if skel is not None:
+        rigs = [
+            r
+            for r in rigs
+            if skel in (_skeleton_path(r) or "").split("/")
+            or (_skeleton_path(r) or "").startswith(skel)
+        ]
     if len(rigs) == 1:
         return rigs[0]
     if not rigs:
-        raise InputError(f"{path}: no hand rig on this stage; 'usdhand reduce' writes one.")
-    names = ", ".join(str(r.GetPath()) for r in rigs)
-    raise InputError(f"{path}: more than one hand rig on this stage: {names}.")
+        of = f" for the skeleton '{skel}'" if skel else ""
+        raise InputError(f"{path}: no hand rig{of} on this stage; 'usdhand reduce' writes one.")
+    names = ", ".join(f"{r.GetPath()} (of {_skeleton_path(r)})" for r in rigs)
+    raise InputError(f"{path}: more than one hand rig; choose a skeleton with --skel: {names}.")
 
 
 def rig_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     """All rigs on a stage, told by their version attribute: works without the schema."""
-    everything = Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
+    everything = stage.Traverse(Usd.TraverseInstanceProxies())
     return (prim for prim in everything if prim.GetAttribute("usdhand:version").HasAuthoredValue())
 
 
 def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Finding]:
     """What is wrong with the rigs of a stage; see `usdhand.formats.usd.check.check_file`."""
+    seen: dict[str | None, str] = {}
     for prim in rig_prims(stage):
-        where = str(prim.GetPath())
+        where, skeleton = str(prim.GetPath()), _skeleton_path(prim)
+        if skeleton is None:
+            yield Finding("error", "rig-skeleton", "the rig's skeleton is not on the stage", where)
+        elif skeleton in seen:
+            message = f"{seen[skeleton]} is a rig of the same skeleton: one must be deactivated"
+            yield Finding("error", "second-rig", message, where)
+        seen[skeleton] = where
         try:
             rig = _relations(prim, path)
+            _stored_frames(prim, path)
+            for name in rig.free:
+                _curve(prim, name, np.zeros(1), path)
         except InputError as error:
             yield Finding("error", "broken-rig", str(error), where)
-            continue
-        if _skeleton_path(prim) is None:
-            yield Finding("error", "rig-skeleton", "the rig's skeleton is not on the stage", where)
-        for name in rig.free:
-            attribute = prim.GetAttribute(f"{CHANNEL_PREFIX}:{name}:value")
-            if not attribute.HasAuthoredValue():
-                message = f"the free channel '{name}' has no value"
-                yield Finding("error", "rig-no-value", message, where)
-
-
-# -- writing ------------------------------------------------------------------------------------
-
-
-def _author_rig(layer: Sdf.Layer, path: Sdf.Path, reduction: Reduction) -> None:
-    rig, clip = reduction.rig, reduction.clip
-    prim = Sdf.CreatePrimInLayer(layer, path)
-    prim.specifier = Sdf.SpecifierDef
-    prim.typeName = "Scope"
-    schemas = Sdf.TokenListOp()
-    instances = [f"HandChannelAPI:{name}" for name in (*rig.names, *rig.held)]
-    schemas.prependedItems = ["HandRigAPI", *instances]
-    prim.SetInfo("apiSchemas", schemas)
-
-    skeleton = Sdf.RelationshipSpec(prim, "usdhand:skeleton", custom=True)
-    skeleton.targetPathList.explicitItems = [Sdf.Path(clip.origin.skeleton_path)]
-    _set(prim, "usdhand:version", _TYPES.Int, VERSION)
-    _set(prim, "usdhand:fit", _TYPES.Token, rig.fit)
-    _set(prim, "usdhand:rangeThreshold", _TYPES.Double, rig.range_threshold)
-    _set(prim, "usdhand:rmsdThreshold", _TYPES.Double, rig.rmsd_threshold)
-    _set(prim, "usdhand:sources", _TYPES.StringArray, Vt.StringArray(list(rig.sources)))
-    if clip.origin.path is not None:
-        _set(prim, "usdhand:sourceHash", _TYPES.String, file_hash(clip.origin.path))
-    for side, frames in reduction.hands.frames.items():
-        _set(prim, f"usdhand:{side}:joints", _TYPES.TokenArray, Vt.TokenArray(list(frames.names)))
-        for name, values in (
-            ("referenceFrames", frames.reference_frames),
-            ("jointFrames", frames.joint_frames),
-        ):
-            quaternions = Vt.QuatdArray.FromNumpy(np.ascontiguousarray(values))
-            _set(prim, f"usdhand:{side}:{name}", _TYPES.QuatdArray, quaternions)
-    times = [float(t) for t in clip.time_codes]
-    curves = dict(zip(reduction.free.names, reduction.free.values.T, strict=True))
-    for relation in rig.relations:
-        _author_channel(layer, prim, relation, times, curves.get(relation.name))
-    for name, value in rig.held.items():
-        _set_channel(prim, name, "kind", _TYPES.Token, HELD)
-        _set_channel(prim, name, "value", _TYPES.Double, value)
-
-
-def _author_channel(
-    layer: Sdf.Layer,
-    prim: Sdf.PrimSpec,
-    relation: Relation,
-    times: list[float],
-    curve: Array | None,
-) -> None:
-    name = relation.name
-    _set_channel(prim, name, "kind", _TYPES.Token, relation.kind)
-    if relation.kind == "free" and curve is not None:
-        attribute = _set_channel(prim, name, "value", _TYPES.Double, None)
-        for time, value in zip(times, curve.tolist(), strict=True):
-            layer.SetTimeSample(attribute.path, time, value)
-        return
-    _set_channel(prim, name, "rmsError", _TYPES.Double, relation.rms_error)
-    if relation.kind == "constant":
-        _set_channel(prim, name, "value", _TYPES.Double, relation.offset)
-        return
-    _set_channel(prim, name, "offset", _TYPES.Double, relation.offset)
-    if relation.rmsd is not None:
-        _set_channel(prim, name, "rmsd", _TYPES.Double, relation.rmsd)
-    if len(relation.controllers) == 1:
-        _set_channel(prim, name, "controller", _TYPES.Token, relation.controllers[0])
-        _set_channel(prim, name, "slope", _TYPES.Double, relation.slopes[0])
-    else:
-        names = Vt.TokenArray(list(relation.controllers))
-        _set_channel(prim, name, "controllers", _TYPES.TokenArray, names)
-        slopes = Vt.DoubleArray(list(relation.slopes))
-        _set_channel(prim, name, "slopes", _TYPES.DoubleArray, slopes)
-
-
-def _set_channel(
-    prim: Sdf.PrimSpec, channel: str, name: str, type_name: Sdf.ValueTypeName, value: Any
-) -> Sdf.AttributeSpec:
-    return _set(prim, f"{CHANNEL_PREFIX}:{channel}:{name}", type_name, value)
-
-
-def _set(
-    prim: Sdf.PrimSpec, name: str, type_name: Sdf.ValueTypeName, value: Any
-) -> Sdf.AttributeSpec:
-    attribute = Sdf.AttributeSpec(prim, name, type_name, Sdf.VariabilityVarying, True)
-    if value is not None:
-        attribute.default = value
-    return attribute
-
-
-# -- reading ------------------------------------------------------------------------------------
 
 
 def _relations(prim: Usd.Prim, path: Path) -> ReducedRig:
@@ -254,7 +198,7 @@ def _relations(prim: Usd.Prim, path: Path) -> ReducedRig:
     for name in _channel_names(prim):
         kind = _value(prim, name, "kind", path)
         if kind == HELD:
-            held[name] = float(_value(prim, name, "value", path))
+            held[name] = _number(prim, name, "value", path)
         elif kind in get_args(Kind):
             relations.append(_relation(prim, name, cast(Kind, kind), path))
         else:
@@ -266,17 +210,19 @@ def _relations(prim: Usd.Prim, path: Path) -> ReducedRig:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
-    def get(name: str, default: Any) -> Any:
+    def get(name: str, kind: type, default: Any) -> Any:
         value = prim.GetAttribute(f"usdhand:{name}").Get()
+        if value is not None and not isinstance(value, kind):
+            raise InputError(f"{path}: usdhand:{name} of the rig has the wrong type.")
         return default if value is None else value
 
     return ReducedRig(
         tuple(relations),
         held,
-        float(get("rangeThreshold", 0.0)),
-        float(get("rmsdThreshold", 0.0)),
-        str(get("fit", "paper")),
-        tuple(str(s) for s in get("sources", ())),
+        float(get("rangeThreshold", float, 0.0)),
+        float(get("rmsdThreshold", float, 0.0)),
+        str(get("fit", str, "paper")),
+        tuple(str(s) for s in get("sources", Vt.StringArray, ())),
     )
 
 
@@ -295,40 +241,52 @@ def _is_channel(attribute: Usd.Attribute) -> bool:
 
 
 def _relation(prim: Usd.Prim, name: str, kind: Kind, path: Path) -> Relation:
-    def get(attribute: str) -> Any:
-        return prim.GetAttribute(f"{CHANNEL_PREFIX}:{name}:{attribute}").Get()
+    def number(attribute: str) -> float | None:
+        there = prim.GetAttribute(f"{CHANNEL_PREFIX}:{name}:{attribute}").HasAuthoredValue()
+        return _number(prim, name, attribute, path) if there else None
 
-    error = float(get("rmsError") or 0.0)
+    error = number("rmsError") or 0.0
     if kind == "free":
         return Relation(name, kind)
     if kind == "constant":
-        return Relation(name, kind, float(_value(prim, name, "value", path)), rms_error=error)
-    several = get("controllers")
-    controllers = tuple(several) if several else (_value(prim, name, "controller", path),)
-    slopes = tuple(get("slopes") or ()) if several else (_value(prim, name, "slope", path),)
-    if len(slopes) != len(controllers):
+        return Relation(name, kind, _number(prim, name, "value", path), rms_error=error)
+    controllers, slopes = _controllers(prim, name, path)
+    offset = _number(prim, name, "offset", path)
+    return Relation(name, kind, offset, controllers, slopes, number("rmsd"), error)
+
+
+def _controllers(
+    prim: Usd.Prim, name: str, path: Path
+) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    several = prim.GetAttribute(f"{CHANNEL_PREFIX}:{name}:controllers").Get()
+    if not several:
+        controller = str(_value(prim, name, "controller", path))
+        return (controller,), (_number(prim, name, "slope", path),)
+    slopes = _value(prim, name, "slopes", path)
+    if not isinstance(slopes, Vt.DoubleArray) or not isinstance(several, Vt.TokenArray):
+        raise InputError(f"{path}: controllers or slopes of channel '{name}' have the wrong type.")
+    if len(slopes) != len(several) or not np.isfinite(np.array(slopes)).all():
         raise InputError(
-            f"{path}: channel '{name}' has {len(controllers)} controllers and {len(slopes)} slopes."
+            f"{path}: the {len(slopes)} slopes of channel '{name}' do not fit its {len(several)} "
+            "controllers."
         )
-    rmsd = get("rmsd")
-    return Relation(
-        name,
-        kind,
-        float(_value(prim, name, "offset", path)),
-        tuple(str(c) for c in controllers),
-        tuple(float(s) for s in slopes),
-        None if rmsd is None else float(rmsd),
-        error,
-    )
+    return tuple(str(c) for c in several), tuple(float(s) for s in slopes)
 
 
 def _value(prim: Usd.Prim, channel: str, name: str, path: Path) -> Any:
     value = prim.GetAttribute(f"{CHANNEL_PREFIX}:{channel}:{name}").Get()
     if value is None:
         raise InputError(f"{path}: channel '{channel}' of the rig has no '{name}'.")
-    if isinstance(value, float) and not np.isfinite(value):
-        raise InputError(f"{path}: '{name}' of channel '{channel}' is not a number.")
     return value
+
+
+def _number(prim: Usd.Prim, channel: str, name: str, path: Path) -> float:
+    value = _value(prim, channel, name, path)
+    if not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
+        raise InputError(
+            f"{path}: '{name}' of channel '{channel}' is {value!r}, which is no sensible number."
+        )
+    return float(value)
 
 
 def _curve(prim: Usd.Prim, name: str, times: Array, path: Path) -> Array:
@@ -337,30 +295,40 @@ def _curve(prim: Usd.Prim, name: str, times: Array, path: Path) -> Array:
     query = Usd.AttributeQuery(attribute)
     sampled = query.GetTimeSamples()
     if not sampled:
-        return np.full(len(times), float(_value(prim, name, "value", path)))
-    values = np.array([query.Get(t) for t in sampled], dtype=np.float64)
-    if not np.isfinite(values).all():
-        raise InputError(f"{path}: the curve of channel '{name}' has values that are no numbers.")
-    return np.interp(times, sampled, values)
+        return np.full(len(times), _number(prim, name, "value", path))
+    values = [query.Get(t) for t in sampled]
+    if not all(isinstance(v, (int, float)) and abs(v) <= LARGEST for v in values):
+        raise InputError(f"{path}: the curve of channel '{name}' has values that are no angles.")
+    return np.interp(times, sampled, np.array(values, dtype=np.float64))
 
 
 def _skeleton_path(prim: Usd.Prim) -> str | None:
-    targets = prim.GetRelationship("usdhand:skeleton").GetTargets()
-    found = [t for t in targets if prim.GetStage().GetPrimAtPath(t).IsA(UsdSkel.Skeleton)]
-    return str(found[0]) if found else None
+    stage = prim.GetStage()
+    for target in prim.GetRelationship("usdhand:skeleton").GetTargets():
+        found = stage.GetPrimAtPath(target)
+        if found and found.IsA(UsdSkel.Skeleton):
+            return str(target)
+    return None
 
 
-def _stored_frames(prim: Usd.Prim) -> dict[Side, StoredFrames]:
+def _stored_frames(prim: Usd.Prim, path: Path) -> dict[Side, StoredFrames]:
     found: dict[Side, StoredFrames] = {}
     for side in SIDES:
-        joints, reference, own = (
-            prim.GetAttribute(f"usdhand:{side}:{name}").Get()
-            for name in ("joints", "referenceFrames", "jointFrames")
-        )
-        if joints and reference and own and len(joints) == len(reference) == len(own):
-            found[side] = StoredFrames(
-                tuple(str(j) for j in joints), np.array(reference), np.array(own)
-            )
+        joints = prim.GetAttribute(f"usdhand:{side}:joints").Get()
+        if joints is None:
+            continue
+        names = tuple(str(j) for j in joints)
+        frames = [
+            np.array(prim.GetAttribute(f"usdhand:{side}:{name}").Get(), dtype=np.float64)
+            for name in ("referenceFrames", "jointFrames")
+        ]
+        for values in frames:
+            fits = values.shape == (len(names), 4) and np.isfinite(values).all()
+            if not fits or np.abs(np.linalg.norm(values, axis=1) - 1.0).max() > UNIT_TOLERANCE:
+                raise InputError(f"{path}: the frames of the {side} hand of the rig are damaged.")
+        if not set(names) <= set(HAND_JOINTS):
+            raise InputError(f"{path}: the rig names {side} hand joints that no hand has.")
+        found[side] = StoredFrames(names, frames[0], frames[1])
     return found
 
 

@@ -48,6 +48,25 @@ def usd_diagnostics() -> Iterator[list[str]]:
         del delegate
 
 
+@contextmanager
+def damage_refused(path: Path) -> Iterator[None]:
+    """Turn what USD raises on data that it cannot unpack into an error for people.
+
+    Raises
+    ------
+    InputError
+        if the file is damaged inside: it opens, but its values cannot be read.
+    """
+    try:
+        yield
+    except Tf.ErrorException as error:
+        raise InputError(f"{path}: the file is damaged, values cannot be read.") from error
+    except TypeError as error:
+        if "to_python" not in str(error):
+            raise
+        raise InputError(f"{path}: the file is damaged, values cannot be read.") from error
+
+
 def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     """Open a stage; what could not be composed comes back as problems.
 
@@ -113,7 +132,8 @@ def find_character(path: Path, skel: str | None = None) -> Character:
 
 def bound_animation(skeleton: Usd.Prim) -> Usd.Prim | None:
     """Return the SkelAnimation that drives a skeleton: bound on it or inherited."""
-    prim = UsdSkel.BindingAPI(skeleton).GetInheritedAnimationSource()
+    with usd_diagnostics():  # a binding that leads nowhere is said by us
+        prim = UsdSkel.BindingAPI(skeleton).GetInheritedAnimationSource()
     return prim if prim and prim.IsA(UsdSkel.Animation) else None
 
 

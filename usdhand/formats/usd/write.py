@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
-from usdhand.errors import OutputError, UsdHandError
+from usdhand.errors import InputError, OutputError, UsdHandError
 from usdhand.formats.output import check_output, written_beside
-from usdhand.formats.usd.animation import author_animation
+from usdhand.formats.usd.animation import author_animation, author_variants
 from usdhand.formats.usd.stage import (
     USD_SUFFIXES,
     Character,
@@ -45,6 +45,7 @@ def write_motion(
     flatten: bool = False,
     force: bool = False,
     inputs: Sequence[Path] = (),
+    variants: Mapping[str, Clip] | None = None,
     author: Callable[[Sdf.Layer, Sdf.Path], None] | None = None,
 ) -> None:
     """Write a character with new motion as a layer over its input.
@@ -54,6 +55,8 @@ def write_motion(
     changed : joints whose motion differs from the input's; all others are kept to the bit
     flatten : write one file that needs no other (always done for .usdz)
     inputs : further files that the output must not replace
+    variants : name -> motion of the same frames: a variant set of the new animation, the first one
+        selected, instead of ``clip`` alone
     author : adds opinions to the new layer; gets it and the path of the character's root prim
 
     Raises
@@ -62,13 +65,19 @@ def write_motion(
         if the output is refused or cannot be written; nothing is left behind then.
     """
     check_output(output, [*stage_files(character.stage), *inputs], force, USD_SUFFIXES)
+    for motion in (clip, *(variants or {}).values()):
+        if not np.isfinite(motion.rotations).all():
+            raise InputError(f"{character.path}: the result has rotations that are no numbers.")
     layer = _layer_over(character.stage, output)
     with Sdf.ChangeBlock():
         for path in _instances_above(character):
             Sdf.CreatePrimInLayer(layer, path).SetInfo("instanceable", False)
         root = character.root.GetPath()
-        animation = _free_child(character.stage, root, ANIMATION_NAME)
-        times = author_animation(layer, animation, character, clip, changed)
+        animation = free_child(character.stage, root, ANIMATION_NAME)
+        if variants:
+            times = author_variants(layer, animation, character, variants, changed)
+        else:
+            times = author_animation(layer, animation, character, clip, changed)
         if character.animation is not None:
             _copy_blend_shapes(layer, animation, UsdSkel.Animation(character.animation))
         _bind(layer, character, animation)
@@ -182,7 +191,8 @@ def _instances_above(character: Character) -> list[Sdf.Path]:
     return [p for p in paths if character.stage.GetPrimAtPath(p).IsInstance()]
 
 
-def _free_child(stage: Usd.Stage, parent: Sdf.Path, name: str) -> Sdf.Path:
+def free_child(stage: Usd.Stage, parent: Sdf.Path, name: str) -> Sdf.Path:
+    """Return a path below ``parent`` that no prim of the stage has yet."""
     path, number = parent.AppendChild(name), 1
     while stage.GetPrimAtPath(path):
         number += 1

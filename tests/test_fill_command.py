@@ -1,0 +1,311 @@
+"""`usdhand fill` and `usdhand evaluate`: what comes out, and what people give instead."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY, shared_data
+from pxr import Usd, UsdSkel
+from test_fill_library import run
+
+from usdhand import api
+from usdhand.api import filling
+from usdhand.errors import InputError, UsageError
+from usdhand.fill import PAPER, FillSettings, MotionLibrary
+from usdhand.fill.limits import channel_limits
+from usdhand.motion import Clip
+from usdhand.motion.resample import resample
+from usdhand.motion.rotations import Array
+
+OPEN: list[Usd.Stage] = []  # prims live as long as their stage
+SAMPLES = REPOSITORY / "samples"
+BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
+FULL = SAMPLES / "conversations" / "talk_01_full.usdc"
+
+
+@pytest.fixture(scope="session")
+def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("library") / "gestures.usdc"
+    run("library", "build", SAMPLES / "gestures", "-o", path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def library(library_file: Path) -> MotionLibrary:
+    return filling.read_library(library_file)
+
+
+@pytest.fixture(scope="session")
+def body() -> Clip:
+    return api.read_clip(BODY)
+
+
+def part_of(clip: Clip, frames: slice, fps: float | None = None) -> Clip:
+    cut = replace(
+        clip,
+        rotations=clip.rotations[frames],
+        translations=clip.translations[frames],
+        scales=clip.scales[frames],
+    )
+    return cut if fps is None else resample(cut, fps)
+
+
+def animation(path: Path) -> UsdSkel.Animation:
+    """The animation that a file's skeleton is bound to."""
+    stage = Usd.Stage.Open(str(path))
+    OPEN.append(stage)
+    [prim] = [p for p in stage.Traverse() if p.IsA(UsdSkel.Skeleton)]
+    return UsdSkel.Animation(UsdSkel.BindingAPI(prim).GetInheritedAnimationSource())
+
+
+def skel_rotations(path: Path, variant: str | None = None) -> Array:
+    """What UsdSkel says that an animation's joints do, in the first half of the clip."""
+    stage = Usd.Stage.Open(str(path))
+    [prim] = [p for p in stage.Traverse() if p.GetName() == "HandMotion"]
+    stage.SetEditTarget(stage.GetSessionLayer())  # the file's layer is shared by all stages
+    if variant:
+        prim.GetVariantSets().SetSelection("fingers", variant)
+    query = UsdSkel.Cache().GetAnimQuery(UsdSkel.Animation(prim))
+    return np.array([np.array(query.ComputeJointLocalTransforms(t)) for t in range(60, 300, 20)])
+
+
+def test_body_is_untouched_and_report_is_whole(library_file: Path, tmp_path: Path) -> None:
+    out, report = tmp_path / "talk.usda", tmp_path / "r.json"
+    run("fill", BODY, "--library", library_file, "-o", out, "--report", report)
+    before, after = animation(BODY), animation(out)
+    places = [list(after.GetJointsAttr().Get()).index(j) for j in before.GetJointsAttr().Get()]
+    times = before.GetRotationsAttr().GetTimeSamples()
+    assert after.GetRotationsAttr().GetTimeSamples() == times
+    for time in times:  # in the body's file, fingers are not animated
+        for one, other in (
+            (before.GetRotationsAttr(), after.GetRotationsAttr()),
+            (before.GetTranslationsAttr(), after.GetTranslationsAttr()),
+        ):
+            assert np.array_equal(np.array(one.Get(time)), np.array(other.Get(time))[places])
+    clip = api.read_clip(out)
+    for frames in api.find_hands(clip).frames.values():
+        assert np.ptp(clip.rotations[:, frames.joints], axis=0).max() > 0.1
+    data = json.loads(report.read_text())
+    assert data["schema"] == "usdhand.fill/1"
+    assert len(data["inputs"]) == 2
+    assert {"hands", "alternatives", "kept", "without", "left_out"} <= set(data)
+    for side in ("left", "right"):
+        segments = data["hands"][side]["segments"]
+        assert segments[0]["start"] == 0
+        assert segments[-1]["end"] == pytest.approx(clip.duration, abs=0.04)
+        for a, b in itertools.pairwise(segments):
+            assert a["end"] == b["start"]
+        for s in segments:
+            assert {"clip", "clip_start", "clip_end", "cost", "transition_cost"} <= set(s)
+            assert 1 <= len(s["candidates"]) <= 5
+            assert s["clip"] in {c["clip"] for c in s["candidates"]}
+        seams = data["hands"][side]["seams"]
+        assert seams["max_acceleration_deg_s2"] < 2 * seams["max_acceleration_captured_deg_s2"]
+    run("check", out)
+
+
+def test_alternatives_are_variants(library_file: Path, tmp_path: Path) -> None:
+    out, flat = tmp_path / "talk.usda", tmp_path / "flat.usdc"
+    arguments = ("fill", BODY, "--library", library_file, "--alternatives", 3)
+    data = json.loads(run(*arguments, "-o", out, "--json").stdout)
+    costs = [a["cost"] for a in data["alternatives"]]
+    assert len(costs) == 3
+    assert costs == sorted(costs)
+    stage = Usd.Stage.Open(str(out))
+    [prim] = [p for p in stage.Traverse() if p.GetName() == "HandMotion"]
+    chosen = prim.GetVariantSets().GetVariantSet("fingers")
+    assert chosen.GetVariantNames() == ["choice_1", "choice_2", "choice_3"]
+    assert chosen.GetVariantSelection() == "choice_1"
+    spec = stage.GetRootLayer().GetPrimAtPath(prim.GetPath())
+    assert not list(spec.properties)  # a local opinion would win over the variants
+    motions = [skel_rotations(out, f"choice_{i}") for i in (1, 2, 3)]
+    assert np.array_equal(motions[0], skel_rotations(out))
+    assert np.abs(motions[0] - motions[1]).max() > 0.01
+    assert np.abs(motions[1] - motions[2]).max() > 0.01
+    text = run(*arguments, "-o", flat, "--flatten").output
+    assert "only the best alternative" in text
+    assert np.array_equal(motions[0], skel_rotations(flat))
+
+
+def test_limits_hold_and_results_repeat(body: Clip, library: MotionLibrary) -> None:
+    filled = filling.fill_fingers(body, library)
+    again = filling.fill_fingers(body, library)
+    assert np.array_equal(filled.clips[0].rotations, again.clips[0].rotations)
+    hands = api.find_hands(body)
+    for part in filled.parts:
+        joints = [hands.frames[s].names for s in part.part]
+        low, high = channel_limits(library, part.part, joints)
+        curves = part.alternatives[0].curves
+        assert (curves >= low - 1e-9).all()
+        assert (curves <= high + 1e-9).all()
+
+
+def test_the_clip_itself_is_not_used(
+    library: MotionLibrary, library_file: Path, tmp_path: Path
+) -> None:
+    copy = SAMPLES / "gestures" / "ok_01.usdc"
+    text = run("fill", copy, "--library", library_file, "-o", tmp_path / "a.usda", "--replace")
+    assert "not used, since it is the same clip: ok_01" in text.output
+    clip = api.read_clip(copy)
+    filled = filling.fill_fingers(replace(clip, name="other"), library, replace_motion=True)
+    assert filled.left_out == ("ok_01",)  # by content
+    only = replace(library, clips=tuple(c for c in library.clips if c.name == "ok_01"))
+    with pytest.raises(InputError, match="nothing but"):
+        filling.fill_fingers(clip, only, replace_motion=True)
+
+
+def test_moving_hands_are_kept_unless_told(library: MotionLibrary) -> None:
+    full = api.read_clip(FULL)
+    with pytest.raises(UsageError, match="already move"):
+        filling.fill_fingers(full, library)
+    hands = api.find_hands(full)
+    rotations = full.rotations.copy()
+    still = hands.frames["left"].joints
+    rotations[:, still] = rotations[:1, still]
+    filled = filling.fill_fingers(full.with_rotations(rotations), library)
+    assert filled.kept == ("right",)
+    assert [p.part for p in filled.parts] == [("left",)]
+    right = hands.frames["right"].joints
+    np.testing.assert_allclose(
+        np.abs((filled.clips[0].rotations[:, right] * full.rotations[:, right]).sum(-1)), 1.0
+    )
+
+
+@pytest.mark.parametrize("fps", [5.0, 12.0, 24.0, 25.0, 59.94, 120.0])
+def test_other_frame_rates(body: Clip, library: MotionLibrary, fps: float) -> None:
+    clip = part_of(body, slice(0, 120), fps)
+    filled = filling.fill_fingers(clip, library)
+    assert len(filled.clips[0]) == len(clip)
+    for part in filled.parts:
+        assert part.alternatives[0].curves.shape[0] == len(clip)
+        assert np.isfinite(part.alternatives[0].curves).all()
+
+
+@pytest.mark.parametrize(("frames", "fps"), [(2, 120.0), (2, 30.0), (3, 30.0)])
+def test_very_short_bodies_are_filled_and_it_is_said(
+    body: Clip, library: MotionLibrary, frames: int, fps: float
+) -> None:
+    clip = replace(part_of(body, slice(40, 40 + frames)), fps=fps)
+    filled = filling.fill_fingers(clip, library)
+    [choice] = filled.parts[0].alternatives[0].choices
+    assert choice.candidates[choice.chosen].stretch != 1.0
+    with pytest.raises(InputError, match="single frame"):
+        filling.fill_fingers(part_of(body, slice(0, 1)), library)
+
+
+def test_a_segment_without_candidates_does_not_fail_the_body(
+    tmp_path: Path, library: MotionLibrary
+) -> None:
+    clips = []
+    for clip in library.clips[:8]:
+        hands = {}
+        for side, hand in clip.hands.items():
+            last = len(hand.arm.wrist) - 1
+            hands[side] = replace(hand, segments=((0, last),))
+        clips.append(replace(clip, hands=hands))
+    filling.write_library(replace(library, clips=tuple(clips)), tmp_path / "long.usdc")
+    out = tmp_path / "a.usda"
+    text = run("fill", BODY, "--library", tmp_path / "long.usdc", "-o", out).output
+    assert "no segment of like length" in text
+    data = json.loads(
+        run("fill", BODY, "--library", tmp_path / "long.usdc", "-o", out, "-n", "--json").stdout
+    )
+    assert max(s["stretched"] for s in data["hands"]["left"]["segments"]) > 1
+
+
+def test_libraries_of_one_side(body: Clip, library: MotionLibrary) -> None:
+    right = tuple(replace(c, hands={"right": c.hands["right"]}) for c in library.clips)
+    filled = filling.fill_fingers(body, replace(library, clips=right))
+    assert filled.without == ("left",)
+    assert [p.part for p in filled.parts] == [("right",)]
+    with pytest.raises(InputError, match="left"):
+        filling.fill_fingers(body, replace(library, clips=right), sides=("left",))
+    halves = [
+        replace(c, hands={s: c.hands[s]})
+        for c, s in zip(library.clips, ("left", "right") * 32, strict=True)
+    ]
+    with pytest.raises(InputError, match="without --couple"):
+        filling.fill_fingers(body, replace(library, clips=tuple(halves)), FillSettings(couple=True))
+    coupled = filling.fill_fingers(body, library, FillSettings(couple=True))
+    assert [p.part for p in coupled.parts] == [("left", "right")]
+    with pytest.raises(InputError, match="empty"):
+        filling.fill_fingers(body, replace(library, clips=()))
+
+
+def test_more_candidates_than_there_are(body: Clip, library: MotionLibrary) -> None:
+    few = replace(library, clips=library.clips[:1])
+    filled = filling.fill_fingers(body, few, FillSettings(k=1000, alternatives=2))
+    assert len(filled.clips) in (1, 2)
+
+
+def test_a_body_without_motion(body: Clip, library: MotionLibrary) -> None:
+    still = body.with_rotations(np.repeat(body.rotations[:1], len(body), axis=0))
+    filled = filling.fill_fingers(still, library)
+    assert np.isfinite(filled.clips[0].rotations).all()
+
+
+@pytest.mark.parametrize("wrong", ["nothing", "clip", "body is library"])
+def test_wrong_inputs_are_refused(library_file: Path, tmp_path: Path, wrong: str) -> None:
+    body, given = BODY, library_file
+    if wrong == "nothing":
+        given = tmp_path / "none.usdc"
+    elif wrong == "clip":
+        given = BODY
+    else:
+        body = library_file
+    out = tmp_path / "a.usda"
+    code = 2 if wrong == "body is library" else 3  # which of its skeletons?
+    text = run("fill", body, "--library", given, "-o", out, code=code).output
+    assert "Traceback" not in text
+    assert not out.exists()
+
+
+def test_paper_preset(body: Clip, library: MotionLibrary) -> None:
+    filled = filling.fill_fingers(part_of(body, slice(0, 200)), library, PAPER)
+    assert np.isfinite(filled.clips[0].rotations).all()
+
+
+@pytest.mark.slow
+def test_evaluate_on_the_samples(library_file: Path) -> None:
+    def errors(preset: str) -> dict[str, dict[str, dict[str, float]]]:
+        text = run("evaluate", library_file, "--preset", preset, "--json").stdout
+        data = json.loads(text)
+        share = {m["name"]: m["share"] for m in data["label_agreement"]["metrics"]}
+        both = share["P + 0.5 R"]
+        assert both > max(share["wrist position (P)"], share["wrist rotation (R)"])
+        return dict(data["reconstruction"])
+
+    ours, paper = errors("default"), errors("paper")
+    for side, methods in ours.items():
+        fill = methods["fill"]["degrees"]
+        assert fill < paper[side]["fill"]["degrees"]
+        for other in ("mean pose", "random", "rest pose"):
+            assert fill < methods[other]["degrees"]
+
+
+@pytest.mark.slow
+@pytest.mark.real_data
+def test_held_out_real_takes() -> None:
+    """Every third take, which no setting was chosen on, filled from all others."""
+    files = sorted(shared_data("studiogalt", "full").glob("*.usdc"))
+    library = filling.build_library(files, Path("library.usdc").absolute()).library
+    takes = [api.read_clip(f) for f in files[2::3]]
+
+    def error(settings: FillSettings, method: str, side: str) -> float:
+        key = (settings.metric, settings.pool)
+        if key not in measured:
+            measured[key] = filling.measure_library(library, Path(), settings, takes=takes)[0]
+        own = [e for e in measured[key] if e.side == side and e.method == method]
+        return float(np.average([e.degrees for e in own], weights=[e.frames for e in own]))
+
+    measured: dict[tuple[str, int], list[filling.HandError]] = {}
+    for side in ("left", "right"):
+        ours = error(FillSettings(), "fill", side)
+        print(side, ours, error(PAPER, "fill", side), error(FillSettings(), "mean pose", side))
+        assert ours < 0.9 * error(PAPER, "fill", side)
+        assert ours < error(FillSettings(), "mean pose", side)

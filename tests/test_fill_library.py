@@ -1,0 +1,223 @@
+"""Motion libraries: what is kept, what is read again, and what people do to them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from conftest import REPOSITORY
+from pxr import Sdf, Usd
+
+from usdhand.api import filling
+from usdhand.cli import main
+from usdhand.errors import InputError
+from usdhand.fill import MotionLibrary
+
+GESTURES = REPOSITORY / "samples" / "gestures"
+CHARACTERS = REPOSITORY / "samples" / "characters"
+NAMES = ("big_01", "ok_01", "ok_02", "wipe_01")
+
+
+def run(*arguments: object, code: int = 0) -> Result:
+    result = CliRunner().invoke(main, [str(a) for a in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == code, result.output
+    return result
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder like the samples, with a few gestures and their character."""
+    place = tmp_path / "place"
+    (place / "gestures").mkdir(parents=True)
+    shutil.copytree(CHARACTERS, place / "characters")
+    for name in NAMES:
+        shutil.copy(GESTURES / f"{name}.usdc", place / "gestures")
+    return place
+
+
+@pytest.fixture
+def library(folder: Path) -> Path:
+    path = folder / "library.usdc"
+    run("library", "build", folder / "gestures", "-o", path)
+    return path
+
+
+def build(folder: Path, *more: object) -> dict[str, object]:
+    text = run(
+        "library", "build", folder / "gestures", "-o", folder / "library.usdc", "--json", *more
+    ).stdout
+    return dict(json.loads(text))
+
+
+def assert_same(a: MotionLibrary, b: MotionLibrary) -> None:
+    assert [c.name for c in a.clips] == [c.name for c in b.clips]
+    for x, y in zip(a.clips, b.clips, strict=True):
+        for name in ("path", "skel", "label", "actor", "height", "fps", "duration", "content_hash"):
+            assert getattr(x, name) == getattr(y, name)
+        assert set(x.hands) == set(y.hands)
+        for side in x.hands:
+            one, other = x.hands[side], y.hands[side]
+            assert (one.joints, one.segments) == (other.joints, other.segments)
+            np.testing.assert_allclose(one.fingers, other.fingers, atol=1e-4)
+            for field in fields(one.arm):
+                ours, theirs = getattr(one.arm, field.name), getattr(other.arm, field.name)
+                np.testing.assert_allclose(ours, theirs, atol=1e-4)
+
+
+def test_round_trip(folder: Path) -> None:
+    paths = sorted((folder / "gestures").iterdir())
+    built = filling.build_library(paths, folder / "library.usda").library
+    filling.write_library(built, folder / "library.usda")
+    read = filling.read_library(folder / "library.usda")
+    assert_same(built, read)
+    assert read.segmentation == built.segmentation
+    assert [c.label for c in read.clips] == ["big", "ok", "ok", "wipe"]
+
+
+@pytest.mark.usefixtures("library")
+def test_only_what_changed_is_read_again(folder: Path) -> None:
+    assert (build(folder)["read"], build(folder)["unchanged"]) == (0, 4)
+    shutil.copy(GESTURES / "small_03.usdc", folder / "gestures" / "ok_02.usdc")
+    assert (build(folder)["read"], build(folder)["unchanged"]) == (1, 0 + 4)
+    (folder / "gestures" / "ok_01.usdc").unlink()
+    assert build(folder)["clips"] == 3
+    assert build(folder, "--rebuild")["read"] == 3
+
+
+def test_other_segments_need_no_reading(folder: Path, library: Path) -> None:
+    before = filling.read_library(library)
+    assert build(folder, "--longest", 1)["read"] == 0
+    after = filling.read_library(library)
+    assert sum(len(c.hands["left"].segments) for c in after.clips) < sum(
+        len(c.hands["left"].segments) for c in before.clips
+    )
+    run("library", "build", folder / "gestures", "-o", folder / "new.usdc", "--longest", 1)
+    assert_same(after, filling.read_library(folder / "new.usdc"))
+
+
+def test_what_someone_edited_stays(folder: Path, library: Path) -> None:
+    stage = Usd.Stage.Open(str(library))
+    stage.GetPrimAtPath("/Library/Clips/ok_02").GetAttribute("usdhand:label").Set("circle")
+    stage.RemovePrim("/Library/Clips/big_01")
+    stage.Save()
+    del stage
+    assert [c.label for c in filling.read_library(library).clips] == ["ok", "circle", "wipe"]
+    (folder / "gestures" / "ok_01.usdc").rename(folder / "gestures" / "fine_01.usdc")
+    build(folder)
+    clips = filling.read_library(library).clips
+    assert [c.label for c in clips] == ["big", "fine", "circle", "wipe"]
+
+
+def test_labels_from_a_table(folder: Path) -> None:
+    table = folder / "labels.csv"
+    table.write_text(
+        "file,label,actor\nok_01,circle,Ada\ngestures/big_01.usdc,wide,\n", "utf-8-sig"
+    )
+    build(folder, "--labels", table)
+    clips = filling.read_library(folder / "library.usdc").clips
+    assert [(c.label, c.actor) for c in clips[:3]] == [("wide", ""), ("circle", "Ada"), ("ok", "")]
+    table.write_text("file,label,colour\nok_01,circle,red\n")
+    arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
+    assert "unknown columns colour" in run(*arguments, "--labels", table, code=3).output
+    table.write_text("name;label\nok_01;circle\n")
+    assert "columns file and label" in run(*arguments, "--labels", table, code=3).output
+
+
+def test_a_broken_clip_is_left_out(folder: Path) -> None:
+    (folder / "gestures" / "broken_01.usdc").write_bytes(b"PXR-USDC nothing")
+    text = run("library", "build", folder / "gestures", "-o", folder / "library.usdc").output
+    assert "left out: gestures/broken_01.usdc" in text
+    read = filling.read_library(folder / "library.usdc")
+    assert len(read.clips) == 4
+    assert [x.path for x in read.left_out] == ["gestures/broken_01.usdc"]
+
+
+def test_no_clip_at_all(folder: Path) -> None:
+    (folder / "only").mkdir()
+    (folder / "only" / "broken.usda").write_text("#usda 1.0\n")
+    run("library", "build", folder / "only", "-o", folder / "library.usdc", code=3)
+    assert not (folder / "library.usdc").exists()
+
+
+@pytest.mark.usefixtures("library")
+def test_a_moved_folder_still_works(folder: Path) -> None:
+    moved = folder.with_name("elsewhere")
+    folder.rename(moved)
+    info = json.loads(run("library", "info", moved / "library.usdc", "--json").stdout)
+    assert info["gone"] == []
+    stage = Usd.Stage.Open(str(moved / "library.usdc"))
+    assert len(list(stage.GetPrimAtPath("/Library/Clips/ok_01/Motion").GetChildren())) > 0
+    (moved / "gestures" / "ok_01.usdc").unlink()
+    info = json.loads(run("library", "info", moved / "library.usdc", "--json").stdout)
+    assert info["gone"] == ["gestures/ok_01.usdc"]
+
+
+def test_same_names_and_odd_names(folder: Path) -> None:
+    for place, name in (
+        ("a", "ok_01"),
+        ("b", "ok_01"),
+        ("a", "grüß 1"),
+        ("a", "gräß 1"),
+        ("a", "1"),
+    ):
+        (folder / place).mkdir(exist_ok=True)
+        shutil.copy(GESTURES / "ok_03.usdc", folder / place / f"{name}.usdc")
+    run("library", "build", folder / "a", folder / "b", "-o", folder / "library.usdc")
+    clips = filling.read_library(folder / "library.usdc").clips
+    assert [c.name for c in clips] == ["1", "a_ok_01", "b_ok_01", "gräß 1", "grüß 1"]
+    assert len({c.path for c in clips}) == 5
+
+
+def test_two_processes_give_the_same(folder: Path, library: Path) -> None:
+    run("library", "build", folder / "gestures", "-o", folder / "two.usdc", "--jobs", 2)
+    assert_same(filling.read_library(library), filling.read_library(folder / "two.usdc"))
+
+
+def test_an_interrupted_build_goes_on(folder: Path) -> None:
+    paths, output = sorted((folder / "gestures").iterdir()), folder / "library.usdc"
+
+    def interrupted(items, _):  # type: ignore[no-untyped-def]
+        for number, item in enumerate(items):
+            if number == 2:
+                raise KeyboardInterrupt
+            yield item
+
+    with pytest.raises(KeyboardInterrupt):
+        filling.build_library(paths, output, progress=interrupted)
+    assert not output.exists()
+    assert (build(folder)["read"], sorted(p.name for p in folder.glob(".*"))) == (2, [])
+
+
+def test_what_is_no_library_is_not_replaced(folder: Path) -> None:
+    other = folder / "gestures" / "ok_01.usdc"
+    before = other.read_bytes()
+    for more in ((), ("--force",), ("--rebuild", "--force")):
+        run("library", "build", CHARACTERS / "ada.usdc", "-o", other, *more, code=2)
+    assert other.read_bytes() == before
+
+
+@pytest.mark.parametrize("damage", ["version", "array", "segments"])
+def test_a_damaged_library_is_refused(library: Path, damage: str) -> None:
+    layer = Sdf.Layer.FindOrOpen(str(library))
+    clip = "/Library/Clips/ok_01.usdhand:right:"
+    if damage == "version":
+        layer.GetAttributeAtPath("/Library.usdhand:libraryVersion").default = 99
+    elif damage == "array":
+        layer.GetAttributeAtPath(f"{clip}arm").default = [1.0, 2.0]
+    else:
+        layer.GetAttributeAtPath(f"{clip}segments").default = [(0, 100000)]
+    layer.Save()
+    with pytest.raises(InputError):
+        filling.read_library(library)
+
+
+def test_output_is_valid(library: Path) -> None:
+    result = json.loads(run("check", library, "--json").stdout)
+    assert "error" not in {f["severity"] for file in result["files"] for f in file["findings"]}

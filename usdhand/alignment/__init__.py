@@ -1,0 +1,21 @@
+"""Time alignment: the type III c warp, and the exact search for the nearest segments under it.
+
+Numbers only: nothing here knows what a feature means. numba is imported on first use.
+"""
+
+from usdhand.alignment.index import SearchIndex, prepare
+from usdhand.alignment.nearest import Matches, merge, search
+from usdhand.alignment.segments import PackedSegments, pack
+from usdhand.alignment.warping import can_warp, warp
+
+__all__ = [
+    "Matches",
+    "PackedSegments",
+    "SearchIndex",
+    "can_warp",
+    "merge",
+    "pack",
+    "prepare",
+    "search",
+    "warp",
+]

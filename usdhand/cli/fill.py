@@ -1,0 +1,187 @@
+"""usdhand fill."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from usdhand.cli.common import (
+    dry_run_option,
+    flatten_option,
+    force_option,
+    json_option,
+    map_option,
+    output_option,
+    quiet_option,
+    report_option,
+    say,
+    side_option,
+    sides,
+    skel_option,
+    verbose_option,
+    warn,
+    warn_of,
+    write_report,
+)
+
+
+@click.command("fill")
+@click.argument("body", type=click.Path(path_type=Path))
+@click.option(
+    "--library",
+    required=True,
+    metavar="LIB",
+    type=click.Path(path_type=Path),
+    help="Library that the fingers are taken from, see `usdhand library build`.",
+)
+@output_option("The body with fingers (.usda, .usdc, .usd, .usdz).")
+@click.option(
+    "--preset",
+    type=click.Choice(["default", "paper"]),
+    default="default",
+    show_default=True,
+    help="All settings together: the measured best, or the paper's.",
+)
+@click.option("--metric", help="How arm motions are compared: arm, chordal or euler (the paper's).")
+@click.option("--k", type=click.IntRange(1), help="Candidates a segment.  [default: 5]")
+@click.option(
+    "--alternatives",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    help="Distinct results, as variants of the animation.",
+)
+@click.option("--couple", is_flag=True, help="Take both hands from the same clip.")
+@click.option(
+    "--replace", "replace_motion", is_flag=True, help="Replace fingers that already move."
+)
+@side_option
+@flatten_option
+@skel_option
+@map_option
+@report_option
+@dry_run_option
+@force_option
+@json_option
+@quiet_option
+@verbose_option
+def command(
+    body: Path,
+    library: Path,
+    output: Path,
+    preset: str,
+    metric: str | None,
+    k: int | None,
+    alternatives: int,
+    couple: bool,
+    replace_motion: bool,
+    side: str,
+    flatten: bool,
+    skel: str | None,
+    maps: tuple[Path, ...],
+    report: Path | None,
+    dry_run: bool,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Give a body clip the fingers of similar motions from a library.
+
+    Cuts the body's arm motion into segments, finds the most similar segments of the library,
+    chooses the smoothest path through them and joins the pieces (Joerg, Hodgins and Safonova
+    2012). The body stays as it is; the library's clip of the very same motion is left out.
+
+    \b
+    Example:
+      usdhand library build samples/gestures -o gestures.usdc
+      usdhand fill samples/conversations/talk_01_body.usdc --library gestures.usdc -o talk.usda
+    """
+    from dataclasses import replace
+
+    from usdhand import api
+    from usdhand.api import filling
+    from usdhand.fill import PAPER, FillSettings
+    from usdhand.formats.output import check_output
+    from usdhand.formats.usd.stage import USD_SUFFIXES
+    from usdhand.report.document import document, dumps
+    from usdhand.report.filling import fill_result
+
+    given: dict[str, Any] = {"metric": metric, "k": k}
+    settings = replace(
+        PAPER if preset == "paper" else FillSettings(),
+        alternatives=alternatives,
+        couple=couple,
+        **{name: value for name, value in given.items() if value is not None},
+    )
+    if not dry_run:
+        check_output(output, [body, library], force, USD_SUFFIXES)
+    conventions = api.conventions_from(maps)
+    motions = filling.read_library(library)
+    clip = api.read_clip(body, skel)
+    warn_of(clip, quiet)
+    filled = filling.fill_fingers(
+        clip,
+        motions,
+        settings,
+        sides=sides(side),
+        replace_motion=replace_motion,
+        conventions=conventions,
+    )
+    if filled.kept:
+        warn(f"{body}: the {' and '.join(filled.kept)} fingers move already and are kept", quiet)
+    for hand in filled.without:
+        warn(f"the library has no motion of a {hand} hand like this; it stays as it is", quiet)
+    if len(filled.clips) > 1 and (flatten or output.suffix.lower() == ".usdz"):
+        warn("a flattened file holds only the best alternative: USD keeps no variants there", quiet)
+    if len(filled.clips) < alternatives:
+        warn(f"there are only {len(filled.clips)} ways that really differ", quiet)
+    if filled.left_out:
+        warn(f"not used, since it is the same clip: {', '.join(filled.left_out)}", quiet)
+    if not dry_run:
+        filling.write_filled(
+            filled, output, flatten=flatten, force=force, conventions=conventions, inputs=[library]
+        )
+    result = fill_result(filled, motions, clip) | {"output": None if dry_run else str(output)}
+    for hand, found in result["hands"].items():
+        odd = [s["stretched"] for s in found["segments"] if s["stretched"] != 1.0]
+        if odd:
+            warn(
+                f"{hand} hand: the library has no segment of like length for {len(odd)} of "
+                f"{len(found['segments'])} segments; their fingers move up to "
+                f"{max(max(x, 1 / x) for x in odd):.1f} times faster or slower",
+                quiet,
+            )
+    shown = {"preset": preset, "side": side, "replace": replace_motion, "metric": settings.metric}
+    more = {"k": settings.k, "alternatives": alternatives, "couple": couple, "skel": skel}
+    text = dumps(document("fill", [body, library, *maps], shown | more, result))
+    write_report(report, text, force)
+    if as_json:
+        click.echo(text)
+        return
+    say(_text(result, verbose), quiet)
+    say("nothing written (dry run)" if dry_run else f"written to {output}", quiet)
+
+
+def _text(result: dict[str, Any], verbose: bool) -> str:
+    lines = []
+    for side, hand in result["hands"].items():
+        clips = {s["clip"] for s in hand["segments"]}
+        seams = hand["seams"]
+        lines.append(
+            f"{side} hand: {len(hand['segments'])} segments from {len(clips)} clips; largest "
+            f"angular acceleration {seams['max_acceleration_deg_s2']:.0f} deg/s^2 at the seams, "
+            f"{seams['max_acceleration_elsewhere_deg_s2']:.0f} elsewhere, "
+            f"{seams['max_acceleration_captured_deg_s2']:.0f} in the library"
+        )
+        for s in hand["segments"] if verbose else ():
+            lines.append(
+                f"  {s['start']:7.2f} to {s['end']:7.2f} s: {s['clip']} "
+                f"{s['clip_start']:.2f} to {s['clip_end']:.2f} s, cost {s['cost']:.1f}"
+            )
+    if len(result["alternatives"]) > 1:
+        costs = ", ".join(f"{a['cost']:.3f}" for a in result["alternatives"])
+        lines.append(f"{len(result['alternatives'])} alternatives, costs {costs}")
+    return "\n".join(lines)

@@ -1,0 +1,213 @@
+"""usdhand library build, usdhand library info."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from usdhand.cli.common import (
+    files_argument,
+    find_files,
+    force_option,
+    json_option,
+    map_option,
+    output_option,
+    quiet_option,
+    report_option,
+    say,
+    warn,
+    write_report,
+)
+
+COLUMNS = {"file", "label", "actor"}
+OUTPUTS = (".usd", ".usda", ".usdc")
+
+
+@click.group("library")
+def command() -> None:
+    """Build a motion library that `fill` takes fingers from, and show what is in one.
+
+    \b
+    Example:
+      usdhand library build samples/gestures -o gestures.usdc
+    """
+
+
+@command.command("build")
+@files_argument("clips")
+@output_option("The library (.usdc, .usda, .usd).")
+@click.option(
+    "--labels",
+    metavar="FILE.csv",
+    type=click.Path(path_type=Path),
+    help="Columns file, label and (if wanted) actor; else labels are taken from file names.",
+)
+@click.option(
+    "--speed", type=float, metavar="CM/S", help="Cut where the wrist is slower than this."
+)
+@click.option("--shortest", type=float, metavar="S", help="Shortest segment.")
+@click.option("--longest", type=float, metavar="S", help="Longest segment.")
+@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
+@click.option("--rebuild", is_flag=True, help="Read all clips again, changed or not.")
+@map_option
+@report_option
+@force_option
+@json_option
+@quiet_option
+def build(
+    clips: tuple[str, ...],
+    output: Path,
+    labels: Path | None,
+    speed: float | None,
+    shortest: float | None,
+    longest: float | None,
+    jobs: int,
+    rebuild: bool,
+    maps: tuple[Path, ...],
+    report: Path | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Read clips with body and fingers into a library.
+
+    Run again, it reads only what changed and keeps labels that someone edited. A clip that cannot
+    be used is reported and left out. The library is a USD stage with a prim a clip.
+
+    \b
+    Examples:
+      usdhand library build samples/gestures -o gestures.usdc
+      usdhand library build takes/*.usdc -o takes.usdc --jobs 2 --labels takes.csv
+    """
+    from usdhand.api import filling
+    from usdhand.errors import OutputError
+    from usdhand.formats.output import check_output
+    from usdhand.report.document import document, dumps
+    from usdhand.report.filling import library_result
+
+    paths = [p for p in find_files(clips) if not _same(p, output)]
+    check_output(output, paths, True, OUTPUTS)
+    if output.exists() and not filling.is_library(output):
+        raise OutputError(f"{output} exists and is no motion library; give another name.")
+    previous = filling.read_library(output) if output.exists() and not rebuild else None
+    segmentation = _segmentation(speed, shortest, longest, previous)
+    result = filling.build_library(
+        paths,
+        output,
+        segmentation=segmentation,
+        labels=_read_labels(labels) if labels else None,
+        previous=previous,
+        maps=maps,
+        jobs=jobs,
+        progress=_progress,
+    )
+    filling.write_library(result.library, output, force=True)
+    filling.forget_interrupted(output)
+    data = library_result(result.library) | {
+        "output": str(output),
+        "read": result.read,
+        "unchanged": result.unchanged,
+    }
+    settings = {"jobs": jobs, "labels": labels, "rebuild": rebuild}
+    text = dumps(document("library", [*paths, *maps], settings, data))
+    write_report(report, text, force)
+    if as_json:
+        click.echo(text)
+        return
+    for left in result.library.left_out:
+        warn(f"left out: {left.path}: {left.reason}", quiet)
+    say(_text(data) + f"\n{result.read} clips read, {result.unchanged} unchanged", quiet)
+    say(f"written to {output}", quiet)
+
+
+@command.command("info")
+@click.argument("library", type=click.Path(path_type=Path))
+@json_option
+@quiet_option
+def info(library: Path, as_json: bool, quiet: bool) -> None:
+    """Show minutes, clips, actors, segments, labels and problems of a library.
+
+    \b
+    Example:
+      usdhand library info gestures.usdc
+    """
+    from usdhand.api import filling
+    from usdhand.report.document import document, dumps
+    from usdhand.report.filling import library_result
+
+    motions = filling.read_library(library)
+    data = library_result(motions, filling.gone_clips(motions, library.absolute().parent))
+    if as_json:
+        click.echo(dumps(document("library", [library], {}, data)))
+    else:
+        say(_text(data), quiet)
+
+
+def _text(data: dict[str, Any]) -> str:
+    segments, cut = data["segments"], data["segmentation"]
+    lines = [
+        f"{data['clips']} clips, {data['minutes']:.2f} minutes, segments: "
+        f"{segments['left']} left, {segments['right']} right "
+        f"({cut['shortest_s']:g} to {cut['longest_s']:g} s, cut at {cut['speed_cm_s']:g} cm/s)",
+    ]
+    if data["actors"]:
+        lines.append("actors: " + ", ".join(data["actors"]))
+    if data["labels"]:
+        lines.append("labels: " + ", ".join(f"{k} ({n})" for k, n in data["labels"].items()))
+    lines += [f"left out: {x['path']}: {x['reason']}" for x in data["left_out"]]
+    lines += [f"file gone (fine for fill, not for evaluate): {path}" for path in data["gone"]]
+    return "\n".join(lines)
+
+
+def _segmentation(
+    speed: float | None, shortest: float | None, longest: float | None, previous: Any
+) -> Any:
+    from dataclasses import replace
+
+    from usdhand.fill import Segmentation
+
+    usual = previous.segmentation if previous else Segmentation()
+    given = {"speed": speed, "shortest": shortest, "longest": longest}
+    return replace(usual, **{k: v for k, v in given.items() if v is not None})
+
+
+def _read_labels(path: Path) -> dict[str, tuple[str, str]]:
+    from usdhand.errors import InputError
+
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            rows, columns = list(reader), set(reader.fieldnames or ())
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read as CSV ({error}).") from error
+    if not {"file", "label"} <= columns:
+        raise InputError(f"{path}: needs a head with the columns file and label.")
+    if columns - COLUMNS:
+        unknown = ", ".join(sorted(map(str, columns - COLUMNS)))
+        raise InputError(f"{path}: unknown columns {unknown}; there are file, label and actor.")
+    return {
+        Path((row["file"] or "").strip()).as_posix(): (
+            (row["label"] or "").strip(),
+            (row.get("actor") or "").strip(),
+        )
+        for row in rows
+    }
+
+
+def _progress(items: Iterable[object], count: int) -> Iterable[object]:
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if count < 3 or not console.is_terminal:
+        return items
+    from rich.progress import track
+
+    return track(items, total=count, description="reading", console=console, transient=True)
+
+
+def _same(a: Path, b: Path) -> bool:
+    return a.exists() and b.exists() and a.samefile(b)

@@ -1,0 +1,83 @@
+"""Chosen segments joined to one motion: Joerg, Hodgins & Safonova 2012, section 3.5."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from usdhand.motion.rotations import Array
+
+Blend = Literal["smooth", "linear"]
+
+# Offsets at a seam that are larger than these are blended out (the paper's thresholds).
+BLEND_MEAN_DEG = 5.0
+BLEND_MAX_DEG = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A segment's finger curves in the body's time.
+
+    Attributes
+    ----------
+    first, last : frames of the body; a piece begins on the last frame of the one before
+    curves : (last - first + 1, channels) degrees
+    """
+
+    first: int
+    last: int
+    curves: Array
+
+
+def join(pieces: Sequence[Piece], blend: Blend = "smooth") -> Array:
+    """Curves (frames, channels) of consecutive pieces without jumps at the seams.
+
+    The difference at a seam is added to the new piece as an offset. With ``linear`` it stays
+    unless its mean exceeds 5 degrees or its maximum 20, and then is blended out linearly, as in
+    the paper. With ``smooth`` (the default) every offset is blended out, together with the
+    difference in speed, along a cubic, so that offsets do not add up and speeds do not jump.
+    """
+    result = np.empty((pieces[-1].last + 1, pieces[0].curves.shape[1]))
+    velocity = np.zeros(result.shape[1])
+    for number, piece in enumerate(pieces):
+        curves = piece.curves
+        if number > 0:
+            offset = result[piece.first] - curves[0]
+            if blend == "linear":
+                curves = curves + offset * _linear_weights(offset, len(curves))
+            else:
+                jump = velocity - _velocity(curves, 0)
+                curves = curves + _cubic(offset, jump, len(curves))
+        result[piece.first : piece.last + 1] = curves
+        velocity = _velocity(curves, -1)
+    return result
+
+
+def limited(curves: Array, low: Array, high: Array) -> Array:
+    """Curves (frames, channels) kept within limits (channels,)."""
+    return np.clip(curves, low, high)
+
+
+def _linear_weights(offset: Array, count: int) -> Array:
+    size = np.abs(offset)
+    if size.mean() <= BLEND_MEAN_DEG and size.max() <= BLEND_MAX_DEG:
+        return np.ones((count, 1))
+    return np.linspace(1.0, 0.0, count)[:, None]
+
+
+def _cubic(offset: Array, jump: Array, count: int) -> Array:
+    """Cubic from (offset, jump a frame) to rest over a piece, (count, channels)."""
+    span = max(count - 1, 1)
+    s = (np.arange(count) / span)[:, None]
+    return offset * (1 + 2 * s) * (1 - s) ** 2 + jump * span * s * (1 - s) ** 2
+
+
+def _velocity(curves: Array, end: int) -> Array:
+    """Degrees a frame at the first (0) or last (-1) frame."""
+    if len(curves) < 2:
+        return np.zeros(curves.shape[1])
+    step: Array = curves[1] - curves[0] if end == 0 else curves[-1] - curves[-2]
+    return step

@@ -1,0 +1,181 @@
+"""A library of motions as values: clips with what search and assembly need of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from usdhand.anatomy import Hands, Side
+from usdhand.anatomy.channels import all_channels
+from usdhand.fill.arm import ArmMotion, arm_motion, body_height
+from usdhand.fill.segment import Segmentation, segments, wrist_speed
+from usdhand.motion import Clip
+from usdhand.motion.resample import interpolate
+from usdhand.motion.rotations import Array
+
+# Arms are searched at this rate; fingers keep that of their clip.
+ARM_FPS = 30.0
+
+# Parts of a body that are filled on their own, or both hands as one.
+Part = tuple[Side, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class LibraryHand:
+    """One hand of a library clip.
+
+    Attributes
+    ----------
+    arm : the arm's motion at `ARM_FPS`
+    joints : hand joints that the rig has
+    fingers : (frames, 3 joints) all channels in degrees, at the clip's rate
+    segments : first and last frame of each segment, at `ARM_FPS`
+    """
+
+    arm: ArmMotion
+    joints: tuple[str, ...]
+    fingers: Array
+    segments: tuple[tuple[int, int], ...]
+
+    def curves_of(self, joints: Sequence[str]) -> Array:
+        """(frames, 3 joints) channels of some of its joints."""
+        if tuple(joints) == self.joints:
+            return self.fingers
+        columns = [3 * self.joints.index(joint) + axis for joint in joints for axis in range(3)]
+        return self.fingers[:, columns]
+
+
+@dataclass(frozen=True, eq=False)
+class LibraryClip:
+    """A clip as the library knows it.
+
+    Attributes
+    ----------
+    name : unique in the library
+    path : the clip's file, as the library refers to it
+    skel : path of its skeleton
+    label, actor : what is said of it, "" if nothing
+    height : cm, of the character
+    fps : of the fingers
+    duration : seconds
+    content_hash : SHA-256 of the file
+    """
+
+    name: str
+    path: str
+    skel: str
+    label: str
+    actor: str
+    height: float
+    fps: float
+    duration: float
+    content_hash: str
+    hands: Mapping[Side, LibraryHand]
+
+
+@dataclass(frozen=True)
+class Left:
+    """A clip that was left out of a library, and why."""
+
+    path: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLibrary:
+    """Clips in order of their names, and how they were cut."""
+
+    clips: tuple[LibraryClip, ...]
+    segmentation: Segmentation = field(default_factory=Segmentation)
+    left_out: tuple[Left, ...] = ()
+
+    @property
+    def minutes(self) -> float:
+        """Minutes of motion."""
+        return sum(c.duration for c in self.clips) / 60.0
+
+
+def library_hands(clip: Clip, hands: Hands, segmentation: Segmentation) -> dict[Side, LibraryHand]:
+    """What a library keeps of a clip's hands."""
+    found: dict[Side, LibraryHand] = {}
+    channels = hands.encode(clip)
+    for side, frames in hands.frames.items():
+        arm = at_arm_rate(arm_motion(clip, hands, side), clip.fps)
+        speed = wrist_speed(arm.hips_position, ARM_FPS, segmentation.smoothing)
+        found[side] = LibraryHand(
+            arm,
+            frames.names,
+            channels.select(all_channels(side, frames.names)).values,
+            tuple(segments(speed, ARM_FPS, segmentation)),
+        )
+    return found
+
+
+def library_clip(
+    clip: Clip,
+    hands: Hands,
+    segmentation: Segmentation,
+    *,
+    path: str,
+    content_hash: str,
+    label: str = "",
+    actor: str = "",
+) -> LibraryClip:
+    """Make a library clip of a clip that was read."""
+    return LibraryClip(
+        clip.name,
+        path,
+        clip.origin.skeleton_path,
+        label,
+        actor,
+        body_height(clip.skeleton, hands),
+        clip.fps,
+        clip.duration,
+        content_hash,
+        library_hands(clip, hands, segmentation),
+    )
+
+
+def at_arm_rate(arm: ArmMotion, fps: float) -> ArmMotion:
+    """Arm motion at `ARM_FPS`; frame i is at i / ARM_FPS seconds, the end is rounded down.
+
+    Two frames at least, since nothing shorter can be a segment.
+    """
+    packed = pack_arm(arm)
+    count = max(2, int(np.floor((len(packed) - 1) * ARM_FPS / fps + 1e-6)) + 1)
+    frames = np.arange(count, dtype=np.float64) * (fps / ARM_FPS)
+    return unpack_arm(interpolate(packed, frames))
+
+
+_ARM_FIELDS: tuple[tuple[str, int], ...] = (
+    ("hips_position", 3),
+    ("chest_position", 3),
+    ("shoulder_position", 3),
+    ("elbow_position", 3),
+    ("hips_shoulder", 3),
+    ("hips_elbow", 3),
+    ("hips_palm", 4),
+    ("chest_palm", 4),
+    ("upper_arm", 4),
+    ("forearm", 4),
+    ("wrist", 3),
+)
+ARM_WIDTH = sum(width for _, width in _ARM_FIELDS)
+
+
+def pack_arm(arm: ArmMotion) -> Array:
+    """(frames, ARM_WIDTH) of an arm's motion."""
+    return np.concatenate([getattr(arm, name) for name, _ in _ARM_FIELDS], axis=1)
+
+
+def unpack_arm(packed: Array) -> ArmMotion:
+    """Arm motion of packed rows; quaternions and directions are brought to unit length."""
+    borders = np.cumsum([width for _, width in _ARM_FIELDS])[:-1]
+    columns = np.split(np.asarray(packed, dtype=np.float64), borders, axis=1)
+    named = dict(zip((name for name, _ in _ARM_FIELDS), columns, strict=True))
+    for name in ("hips_palm", "chest_palm", "upper_arm", "forearm", "wrist"):
+        length = np.linalg.norm(named[name], axis=1, keepdims=True)
+        named[name] = named[name] / np.where(length > 1e-9, length, 1.0)
+    return ArmMotion(**named)

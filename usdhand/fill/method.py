@@ -1,0 +1,254 @@
+"""Fill: fingers for a body clip from a library (Joerg, Hodgins & Safonova 2012)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import PurePosixPath
+
+import numpy as np
+
+from usdhand.anatomy import SIDES, Channels, Hands, Side
+from usdhand.anatomy.channels import all_channels
+from usdhand.errors import InputError, UsageError
+from usdhand.fill.arm import arm_motion
+from usdhand.fill.assemble import Piece, join, limited
+from usdhand.fill.candidates import (
+    Candidate,
+    SearchSpace,
+    find_candidates,
+    finger_curves,
+    finger_sources,
+    part_rows,
+    part_segments,
+    search_space,
+)
+from usdhand.fill.choose import Graph, choose, graph
+from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate
+from usdhand.fill.limits import channel_limits
+from usdhand.fill.metric import metric
+from usdhand.fill.path import Path
+from usdhand.fill.results import Alternative, Choice, Filled, FilledPart
+from usdhand.fill.segment import Segmentation
+from usdhand.fill.settings import FillSettings
+from usdhand.motion import Clip
+
+# Fingers that move less than this, in every channel, are still: there is nothing to lose.
+STILL_DEG = 2.0
+# A segment of the body has at least so many frames: speeds and seams need some.
+FEWEST_FRAMES = 3
+
+
+def fill(
+    body: Clip,
+    hands: Hands,
+    library: MotionLibrary,
+    settings: FillSettings | None = None,
+    *,
+    sides: Sequence[Side] = SIDES,
+    replace_motion: bool = False,
+    content_hash: str | None = None,
+    spaces: Mapping[Part, SearchSpace] | None = None,
+) -> Filled:
+    """Give a body clip the fingers of similar motions.
+
+    Parameters
+    ----------
+    sides : hands to fill
+    replace_motion : also replace finger motion that is there and moves
+    content_hash : of the body's file: the library's clip with the same content, or with the same
+        name, is the very motion that is filled, and left out
+    spaces : search spaces made before, to fill many bodies from one library
+
+    Raises
+    ------
+    UsageError
+        if all hands already move and may not be replaced.
+    InputError
+        if the library has no motion for any of the hands, or the body is a single frame.
+    """
+    settings = settings or FillSettings()
+    if len(body) < 2:
+        raise InputError(f"{body.name} is a single frame; there is no motion to find fingers for.")
+    channels = hands.encode(body)
+    own = _own_clips(library, body.name, content_hash)
+    moving = tuple(s for s in sides if s in hands.frames and _moves(channels, hands, s))
+    kept = () if replace_motion else moving
+    open_sides: Part = tuple(s for s in sides if s in hands.frames and s not in kept)
+    if not open_sides:
+        raise UsageError(
+            f"The fingers of {body.name} already move ({' and '.join(kept) or 'no hand'}); "
+            "ask for it to be replaced if that is meant (--replace)."
+        )
+    usable = {s: _usable_clips(library, (s,), hands, own) for s in open_sides}
+    wanted: Part = tuple(s for s in open_sides if usable[s])
+    if not wanted:
+        raise InputError(_why_none(library, body, hands, open_sides, own))
+    together = settings.couple and len(wanted) == 2
+    parts: list[Part] = [wanted] if together else [(s,) for s in wanted]
+    if together and not _usable_clips(library, wanted, hands, own):
+        raise InputError(
+            "No clip of the library has both hands; fill each hand on its own (without --couple)."
+        )
+    filled = tuple(
+        _fill_part(
+            body,
+            hands,
+            library,
+            (spaces or {}).get(part) or space_for(library, part, settings),
+            settings,
+            _usable_clips(library, part, hands, own),
+        )
+        for part in parts
+    )
+    column = {name: i for i, name in enumerate(channels.names)}
+    clips = []
+    for number in range(max(len(done.alternatives) for done in filled)):
+        values = channels.values.copy()
+        for done in filled:
+            alternative = done.alternatives[min(number, len(done.alternatives) - 1)]
+            values[:, [column[n] for n in alternative.names]] = alternative.curves
+        clips.append(hands.decode(Channels(channels.names, values), body))
+    return Filled(
+        tuple(clips),
+        filled,
+        kept,
+        tuple(s for s in open_sides if s not in wanted),
+        tuple(library.clips[i].name for i in own),
+        settings,
+    )
+
+
+def space_for(library: MotionLibrary, part: Part, settings: FillSettings) -> SearchSpace:
+    """Make the search space that these settings need."""
+    return search_space(library, part, metric(settings.metric), settings.segmentation)
+
+
+def fingers_move(clip: Clip, hands: Hands, side: Side) -> bool:
+    """Whether a hand's fingers have motion of their own."""
+    return side in hands.frames and _moves(hands.encode(clip), hands, side)
+
+
+def _moves(channels: Channels, hands: Hands, side: Side) -> bool:
+    curves = channels.select(all_channels(side, hands.frames[side].names)).values
+    return bool(np.ptp(curves, axis=0).max() > STILL_DEG)
+
+
+def _own_clips(library: MotionLibrary, name: str, content_hash: str | None) -> list[int]:
+    """Library clips that are the very motion that is filled: by content, or by name."""
+    return [
+        i
+        for i, clip in enumerate(library.clips)
+        if clip.content_hash == content_hash or name in (clip.name, PurePosixPath(clip.path).stem)
+    ]
+
+
+def _usable_clips(
+    library: MotionLibrary, part: Part, hands: Hands, own: Sequence[int]
+) -> frozenset[int]:
+    """Library clips with segments and all the hand joints of the body that are not its own."""
+    return frozenset(
+        i
+        for i, clip in enumerate(library.clips)
+        if i not in own
+        and all(
+            side in clip.hands
+            and clip.hands[side].segments
+            and set(hands.frames[side].names) <= set(clip.hands[side].joints)
+            for side in part
+        )
+    )
+
+
+def _why_none(
+    library: MotionLibrary, body: Clip, hands: Hands, sides: Part, own: Sequence[int]
+) -> str:
+    if not library.clips:
+        return "The library is empty; build it from clips with body and fingers."
+    if any(_usable_clips(library, (side,), hands, ()) for side in sides):
+        names = ", ".join(library.clips[i].name for i in own)
+        return f"The library has nothing but {body.name} itself ({names}); add other motion."
+    joints = "; ".join(f"{side}: {', '.join(hands.frames[side].names)}" for side in sides)
+    return f"No clip of the library has the hand joints of {body.name} ({joints})."
+
+
+def _fill_part(
+    body: Clip,
+    hands: Hands,
+    library: MotionLibrary,
+    space: SearchSpace,
+    settings: FillSettings,
+    usable: frozenset[int],
+) -> FilledPart:
+    part = space.part
+    joints = [hands.frames[side].names for side in part]
+    names = tuple(
+        n for side, own in zip(part, joints, strict=True) for n in all_channels(side, own)
+    )
+    arms = [at_arm_rate(arm_motion(body, hands, side), body.fps) for side in part]
+    cut = part_segments(arms, _for_rate(space.segmentation, body.fps))
+    rows = part_rows(arms, space.metric)
+    found = find_candidates(
+        [rows[a : b + 1] for a, b in cut],
+        space,
+        max(settings.k, settings.pool),
+        settings.factor,
+        [i for i in range(len(library.clips)) if i not in usable],
+    )
+    sources = finger_sources(library, part, joints, usable)
+    borders = _body_frames(cut, body)
+    curves = [
+        finger_curves(candidates, space, sources, np.arange(b - a + 1) / body.fps)
+        for (a, b), candidates in zip(borders, found, strict=True)
+    ]
+    network = graph(found, curves, names, body.fps, settings)
+    low, high = channel_limits(library, part, joints)
+    alternatives = []
+    for path in choose(network, settings):
+        pieces = [
+            Piece(a, b, own[layer.order[node]])
+            for (a, b), own, layer, node in zip(
+                borders, curves, network.layers, path.nodes, strict=True
+            )
+        ]
+        joined = limited(join(pieces, settings.blend), low, high)
+        choices = _choices(path, network, found, cut)
+        seams = tuple(piece.first for piece in pieces[1:])
+        alternatives.append(Alternative(names, joined, choices, path.cost, seams))
+    return FilledPart(part, space, tuple(alternatives))
+
+
+def _choices(
+    path: Path,
+    network: Graph,
+    found: Sequence[Sequence[Candidate]],
+    cut: Sequence[tuple[int, int]],
+) -> tuple[Choice, ...]:
+    choices = []
+    for i, node in enumerate(path.nodes):
+        layer = network.layers[i]
+        choices.append(
+            Choice(
+                cut[i][0] / ARM_FPS,
+                cut[i][1] / ARM_FPS,
+                tuple(found[i][j] for j in layer.order),
+                found[i][0],
+                node,
+                float(layer.costs[node]),
+                float(network.edges[i - 1][path.nodes[i - 1], node]) if i else 0.0,
+            )
+        )
+    return tuple(choices)
+
+
+def _for_rate(segmentation: Segmentation, fps: float) -> Segmentation:
+    """Segments that are long enough for a body with few frames a second."""
+    shortest = max(segmentation.shortest, FEWEST_FRAMES / fps)
+    return replace(segmentation, shortest=shortest, longest=max(segmentation.longest, 2 * shortest))
+
+
+def _body_frames(cut: Sequence[tuple[int, int]], body: Clip) -> list[tuple[int, int]]:
+    """Body frames of segments that were cut at `ARM_FPS`; the last one takes what is left."""
+    borders = [round(a / ARM_FPS * body.fps) for a, _ in cut] + [len(body) - 1]
+    return list(pairwise(borders))

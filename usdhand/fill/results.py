@@ -1,0 +1,73 @@
+"""What fill found: values that reports are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from usdhand.anatomy import Side
+from usdhand.fill.candidates import Candidate, SearchSpace
+from usdhand.fill.library import Part
+from usdhand.fill.settings import FillSettings
+from usdhand.motion import Clip
+from usdhand.motion.rotations import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A segment of the body and what was chosen for it.
+
+    Attributes
+    ----------
+    start, end : seconds from the first frame of the body
+    candidates : the ones that could be chosen, best first; ``chosen`` is an index into them
+    nearest : the one whose arm motion is most alike
+    node_cost, transition_cost : of the choice, the latter from the segment before
+    """
+
+    start: float
+    end: float
+    candidates: tuple[Candidate, ...]
+    nearest: Candidate
+    chosen: int
+    node_cost: float
+    transition_cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """One way of filling a part: finger channels at the body's frames."""
+
+    names: tuple[str, ...]
+    curves: Array
+    choices: tuple[Choice, ...]
+    cost: float
+    seams: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FilledPart:
+    """A part of the body and the ways in which it was filled, best first."""
+
+    part: Part
+    space: SearchSpace
+    alternatives: tuple[Alternative, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Filled:
+    """A body clip with fingers.
+
+    Attributes
+    ----------
+    clips : an alternative each, best first
+    kept : hands whose own finger motion was kept, since it moves
+    without : hands that the library has no motion for
+    left_out : names of library clips that were not used, since they are the body's own
+    """
+
+    clips: tuple[Clip, ...]
+    parts: tuple[FilledPart, ...]
+    kept: tuple[Side, ...] = ()
+    without: tuple[Side, ...] = ()
+    left_out: tuple[str, ...] = ()
+    settings: FillSettings = field(default_factory=FillSettings)

@@ -1,0 +1,58 @@
+"""How fill chooses: what a user may set, and the paper's own values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from usdhand.errors import UsageError
+from usdhand.fill.assemble import Blend
+from usdhand.fill.metric import DEFAULT_METRIC
+from usdhand.fill.segment import PAPER_SEGMENTATION, Segmentation
+
+
+@dataclass(frozen=True)
+class FillSettings:
+    """How fingers are chosen; `PAPER` has the paper's own values.
+
+    Attributes
+    ----------
+    metric : name of the metric of arm motion
+    k : candidates a segment
+    factor : largest ratio of lengths of a segment and its candidate
+    pool : neighbours that say which of them is typical; 0: no opinion
+    segmentation : how the motion is cut; None: as the library is
+    sharpness : how fast a neighbour's say fades with its cost
+    segment_weight, transition_weight : of both costs on the path
+    scaled : bring both costs to the same average first, as the paper wants them
+    angle_weight, velocity_weight : of the transition cost
+    alternatives : how many results
+    couple : take both hands from the same clip
+    """
+
+    metric: str = DEFAULT_METRIC
+    k: int = 5
+    factor: float = 1.5
+    pool: int = 20
+    sharpness: float = 0.5
+    segmentation: Segmentation | None = None
+    segment_weight: float = 1.0
+    transition_weight: float = 0.5
+    scaled: bool = True
+    angle_weight: float = 1.0
+    velocity_weight: float = 0.5
+    blend: Blend = "smooth"
+    alternatives: int = 1
+    couple: bool = False
+
+    def __post_init__(self) -> None:
+        if self.k < 1 or self.alternatives < 1:
+            raise UsageError("Give at least one candidate and one alternative.")
+        if self.factor < 1.0:
+            raise UsageError(
+                f"A length factor of {self.factor:g} leaves no candidates: give 1 or more."
+            )
+
+
+PAPER = FillSettings(
+    metric="euler", pool=0, scaled=False, blend="linear", segmentation=PAPER_SEGMENTATION
+)

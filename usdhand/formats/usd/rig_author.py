@@ -1,0 +1,100 @@
+"""A reduced rig authored as custom attributes of a Scope."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pxr import Sdf, Vt
+
+from usdhand.formats.hashing import file_hash
+from usdhand.motion.rotations import Array
+from usdhand.reduce import Reduction, Relation
+
+VERSION = 1
+CHANNEL_PREFIX = "usdhand:channel"
+HELD = "held"
+_TYPES = Sdf.ValueTypeNames
+
+
+def author_rig(layer: Sdf.Layer, path: Sdf.Path, reduction: Reduction) -> None:
+    """Write a rig as a Scope at ``path``: explicit custom attributes, typed by the schema."""
+    rig, clip = reduction.rig, reduction.clip
+    prim = Sdf.CreatePrimInLayer(layer, path)
+    prim.specifier = Sdf.SpecifierDef
+    prim.typeName = "Scope"
+    schemas = Sdf.TokenListOp()
+    instances = [f"HandChannelAPI:{name}" for name in (*rig.names, *rig.held)]
+    schemas.prependedItems = ["HandRigAPI", *instances]
+    prim.SetInfo("apiSchemas", schemas)
+
+    skeleton = Sdf.RelationshipSpec(prim, "usdhand:skeleton", custom=True)
+    skeleton.targetPathList.explicitItems = [Sdf.Path(clip.origin.skeleton_path)]
+    _set(prim, "usdhand:version", _TYPES.Int, VERSION)
+    _set(prim, "usdhand:fit", _TYPES.Token, rig.fit)
+    _set(prim, "usdhand:rangeThreshold", _TYPES.Double, rig.range_threshold)
+    _set(prim, "usdhand:rmsdThreshold", _TYPES.Double, rig.rmsd_threshold)
+    _set(prim, "usdhand:sources", _TYPES.StringArray, Vt.StringArray(list(rig.sources)))
+    if clip.origin.path is not None:
+        _set(prim, "usdhand:sourceHash", _TYPES.String, file_hash(clip.origin.path))
+    for side, frames in reduction.hands.frames.items():
+        _set(prim, f"usdhand:{side}:joints", _TYPES.TokenArray, Vt.TokenArray(list(frames.names)))
+        for name, values in (
+            ("referenceFrames", frames.reference_frames),
+            ("jointFrames", frames.joint_frames),
+        ):
+            quaternions = Vt.QuatdArray.FromNumpy(np.ascontiguousarray(values))
+            _set(prim, f"usdhand:{side}:{name}", _TYPES.QuatdArray, quaternions)
+    times = [float(t) for t in clip.time_codes]
+    curves = dict(zip(reduction.free.names, reduction.free.values.T, strict=True))
+    for relation in rig.relations:
+        _author_channel(layer, prim, relation, times, curves.get(relation.name))
+    for name, value in rig.held.items():
+        _set_channel(prim, name, "kind", _TYPES.Token, HELD)
+        _set_channel(prim, name, "value", _TYPES.Double, value)
+
+
+def _author_channel(
+    layer: Sdf.Layer,
+    prim: Sdf.PrimSpec,
+    relation: Relation,
+    times: list[float],
+    curve: Array | None,
+) -> None:
+    name = relation.name
+    _set_channel(prim, name, "kind", _TYPES.Token, relation.kind)
+    if relation.kind == "free" and curve is not None:
+        attribute = _set_channel(prim, name, "value", _TYPES.Double, None)
+        for time, value in zip(times, curve.tolist(), strict=True):
+            layer.SetTimeSample(attribute.path, time, value)
+        return
+    _set_channel(prim, name, "rmsError", _TYPES.Double, relation.rms_error)
+    if relation.kind == "constant":
+        _set_channel(prim, name, "value", _TYPES.Double, relation.offset)
+        return
+    _set_channel(prim, name, "offset", _TYPES.Double, relation.offset)
+    if relation.rmsd is not None:
+        _set_channel(prim, name, "rmsd", _TYPES.Double, relation.rmsd)
+    if len(relation.controllers) == 1:
+        _set_channel(prim, name, "controller", _TYPES.Token, relation.controllers[0])
+        _set_channel(prim, name, "slope", _TYPES.Double, relation.slopes[0])
+    else:
+        names = Vt.TokenArray(list(relation.controllers))
+        _set_channel(prim, name, "controllers", _TYPES.TokenArray, names)
+        slopes = Vt.DoubleArray(list(relation.slopes))
+        _set_channel(prim, name, "slopes", _TYPES.DoubleArray, slopes)
+
+
+def _set_channel(
+    prim: Sdf.PrimSpec, channel: str, name: str, type_name: Sdf.ValueTypeName, value: Any
+) -> Sdf.AttributeSpec:
+    return _set(prim, f"{CHANNEL_PREFIX}:{channel}:{name}", type_name, value)
+
+
+def _set(
+    prim: Sdf.PrimSpec, name: str, type_name: Sdf.ValueTypeName, value: Any
+) -> Sdf.AttributeSpec:
+    attribute = Sdf.AttributeSpec(prim, name, type_name, Sdf.VariabilityVarying, True)
+    if value is not None:
+        attribute.default = value
+    return attribute
