@@ -6,7 +6,7 @@ Numbers only: nothing here knows what a feature means. numba is imported on firs
 from usdhand.alignment.index import SearchIndex, prepare
 from usdhand.alignment.nearest import Matches, merge, search
 from usdhand.alignment.segments import PackedSegments, pack
-from usdhand.alignment.warping import can_warp, warp
+from usdhand.alignment.warping import can_warp, warp, warp_many
 
 __all__ = [
     "Matches",
@@ -18,4 +18,5 @@ __all__ = [
     "prepare",
     "search",
     "warp",
+    "warp_many",
 ]

@@ -13,7 +13,10 @@ from usdhand.alignment.refine import nearest, ranked
 from usdhand.alignment.segments import PackedSegments
 from usdhand.errors import UsageError
 
-_BATCH = 20  # queries whose bounds are in memory at once
+# Queries whose bounds are in memory at once: few for a large library, many for a small one, since
+# each batch starts its threads anew.
+_BATCH = 20
+_ROOM_BYTES = 64e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +81,11 @@ def search(
         return Matches(ids, costs)
     prepared = [prepare_query(index, queries[number], max_ratio) for number in range(len(queries))]
     most = max(query.last - query.first for query in prepared)
-    room = np.empty((min(_BATCH, len(prepared)), 1 + len(STAGES) if prune else 1, most), np.float32)
-    for start in range(0, len(prepared), _BATCH):
-        batch = prepared[start : start + _BATCH]
+    rows = 1 + len(STAGES) if prune else 1
+    size = min(len(prepared), max(_BATCH, int(_ROOM_BYTES / (4 * rows * max(most, 1)))))
+    room = np.empty((size, rows, most), np.float32)
+    for start in range(0, len(prepared), size):
+        batch = prepared[start : start + size]
         forbidden = excluded[start : start + len(batch)]
         if prune:
             _fill_bounds(index, batch, threads, room)

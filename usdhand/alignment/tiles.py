@@ -63,6 +63,40 @@ def warp_moves(query: Features, candidate: Features, moves: Moves) -> float:
 
 
 @kernel
+def warp_path(query: Features, candidate: Features, path: Ints) -> float:
+    """Accumulated cost in float64; ``path`` (n,) gets the candidate frame of each query frame."""
+    moves = np.zeros((len(query), len(candidate)), np.int8)
+    cost = warp_moves(query, candidate, moves)
+    frame = len(candidate) - 1
+    path[-1] = frame
+    stayed = False
+    for i in range(len(query) - 1, 0, -1):
+        # before a stay there was a step
+        stayed = moves[i, frame] & 4 != 0 and not stayed
+        if not stayed:
+            frame -= moves[i, frame] & 3
+        path[i - 1] = frame
+    return cost
+
+
+@kernel
+def warp_paths(
+    queries: Features,
+    query_spans: Ints,
+    candidates: Features,
+    candidate_spans: Ints,
+    paths: Ints,
+    path_begins: Ints,
+) -> None:
+    """``warp_path`` of many pairs: their spans (pairs, 2) of rows, and where their paths begin."""
+    for pair in range(len(query_spans)):
+        first, stop = query_spans[pair]
+        begin, end = candidate_spans[pair]
+        at = path_begins[pair]
+        warp_path(queries[first:stop], candidates[begin:end], paths[at : at + stop - first])
+
+
+@kernel
 def fill_tile(
     codes: Codes, step: Floats, begins: Ints, lengths: Ints, stop: int, tile: Floats
 ) -> None:

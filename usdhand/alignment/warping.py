@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from usdhand.alignment.segments import PackedSegments
 from usdhand.errors import InputError, UsageError
 
 
@@ -53,16 +54,50 @@ def warp(query: ArrayLike, candidate: ArrayLike) -> tuple[NDArray[np.intp], floa
     >>> path.tolist(), cost
     ([0, 1, 1, 3], 0.0)
     """
-    from usdhand.alignment.tiles import warp_moves
+    from usdhand.alignment.tiles import warp_path
 
     rows, columns = _matrix(query), _matrix(candidate)
     if rows.shape[1] != columns.shape[1]:
         raise UsageError(f"{rows.shape[1]} features cannot be compared with {columns.shape[1]}")
-    if not can_warp(len(rows), len(columns)):
-        raise UsageError(f"{len(columns)} frames cannot be warped to {len(rows)}")
-    moves = np.zeros((len(rows), len(columns)), np.int8)
-    cost = warp_moves(rows, columns, moves) / len(rows)
-    return _way_back(moves), cost
+    _check_lengths(len(rows), len(columns))
+    path = np.empty(len(rows), np.int64)
+    cost = warp_path(rows, columns, path) / len(rows)
+    return path, cost
+
+
+def warp_many(
+    queries: PackedSegments, candidates: PackedSegments, pairs: ArrayLike
+) -> list[NDArray[np.intp]]:
+    """Paths of `warp` for many pairs at once.
+
+    Parameters
+    ----------
+    pairs : (pairs, 2) number of the query and of the candidate among the segments packed
+
+    Raises
+    ------
+    UsageError
+        if the lengths of a pair are too different, see `can_warp`.
+    """
+    from usdhand.alignment.tiles import warp_paths
+
+    numbers = np.asarray(pairs, dtype=np.intp).reshape(-1, 2)
+    spans = [
+        np.stack([packed.offsets[own], packed.offsets[own + 1]], axis=1).astype(np.int64)
+        for packed, own in zip((queries, candidates), numbers.T, strict=True)
+    ]
+    lengths = [np.diff(span, axis=1)[:, 0] for span in spans]
+    for n, m in set(zip(lengths[0].tolist(), lengths[1].tolist(), strict=True)):
+        _check_lengths(n, m)
+    ends = np.cumsum(lengths[0])
+    paths = np.empty(int(ends[-1]) if len(ends) else 0, np.int64)
+    warp_paths(queries.features, spans[0], candidates.features, spans[1], paths, ends - lengths[0])
+    return np.split(paths, ends[:-1]) if len(ends) else []
+
+
+def _check_lengths(query_frames: int, candidate_frames: int) -> None:
+    if not can_warp(query_frames, candidate_frames):
+        raise UsageError(f"{candidate_frames} frames cannot be warped to {query_frames}")
 
 
 def _matrix(features: ArrayLike) -> NDArray[np.float64]:
@@ -72,16 +107,3 @@ def _matrix(features: ArrayLike) -> NDArray[np.float64]:
     if not np.isfinite(matrix).all():
         raise InputError("features are not all finite numbers")
     return matrix
-
-
-def _way_back(moves: NDArray[np.int8]) -> NDArray[np.intp]:
-    path = np.empty(len(moves), np.intp)
-    path[-1] = frame = moves.shape[1] - 1
-    stayed = False
-    for i in range(len(moves) - 1, 0, -1):
-        # before a stay there was a step
-        stayed = bool(moves[i, frame] & 4) and not stayed
-        if not stayed:
-            frame -= int(moves[i, frame] & 3)
-        path[i - 1] = frame
-    return path

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from usdhand.alignment import SearchIndex, pack, prepare, search, warp
+from usdhand.alignment import PackedSegments, SearchIndex, pack, prepare, search, warp_many
 from usdhand.fill.arm import ArmMotion
 from usdhand.fill.library import ARM_FPS, MotionLibrary, Part
 from usdhand.fill.metric import Metric
@@ -34,6 +34,7 @@ class SearchSpace:
     firsts: NDArray[np.intp]
     lasts: NDArray[np.intp]
     rows: tuple[NDArray[np.float32], ...]
+    packed: PackedSegments
     index: SearchIndex
 
     def segment_rows(self, segment: int) -> NDArray[np.float32]:
@@ -87,6 +88,7 @@ def search_space(
             firsts.append(first)
             lasts.append(last)
     pieces = [rows[c][a : b + 1] for c, a, b in zip(clips, firsts, lasts, strict=True)]
+    packed = pack(pieces, groups=np.array(clips, dtype=np.int32))
     return SearchSpace(
         part,
         metric,
@@ -95,7 +97,8 @@ def search_space(
         np.array(firsts, dtype=np.intp),
         np.array(lasts, dtype=np.intp),
         tuple(rows),
-        prepare(pack(pieces, groups=np.array(clips, dtype=np.int32))),
+        packed,
+        prepare(packed),
     )
 
 
@@ -154,15 +157,16 @@ def _search(
     exclude: Sequence[int],
 ) -> list[list[Candidate]]:
     groups = np.tile(np.array(list(exclude) or [-1], np.int32), (len(queries), 1))
-    matches = search(space.index, pack(queries), k=count, max_ratio=factor, exclude=groups)
-    return [
-        [
-            Candidate(int(segment), float(cost), warp(query, space.segment_rows(int(segment)))[0])
-            for segment, cost in zip(ids, costs, strict=True)
-            if segment >= 0
-        ]
-        for query, ids, costs in zip(queries, matches.ids, matches.costs, strict=True)
-    ]
+    asked = pack(queries)
+    matches = search(space.index, asked, k=count, max_ratio=factor, exclude=groups)
+    rows, columns = np.nonzero(matches.ids >= 0)
+    segments_found = matches.ids[rows, columns]
+    paths = warp_many(asked, space.packed, np.stack([rows, segments_found], axis=1))
+    costs = matches.costs[rows, columns].tolist()
+    found: list[list[Candidate]] = [[] for _ in queries]
+    for row, segment, cost, path in zip(rows, segments_found.tolist(), costs, paths, strict=True):
+        found[row].append(Candidate(segment, cost, path))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
