@@ -74,7 +74,10 @@ def build(files: Sequence[Path], folder: Path) -> MotionLibrary:
 def errors_of(
     library: MotionLibrary, folder: Path, takes: Sequence[Clip], settings: FillSettings
 ) -> list[HandError]:
-    return filling.measure_library(library, folder, settings, takes=takes)
+    errors, left = filling.measure_library(library, folder, settings, takes=takes)
+    for clip in left:
+        print(f"left out: {clip.path}: {clip.reason}")
+    return errors
 
 
 def compare(title: str, library: MotionLibrary, folder: Path, takes: Sequence[Clip]) -> None:

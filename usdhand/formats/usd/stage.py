@@ -13,6 +13,7 @@ from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Problem
 
+MOST_NAMED = 8  # skeletons in a message
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 
@@ -150,7 +151,8 @@ def binding_prim(skeleton: Usd.Prim) -> Usd.Prim:
 
 def choose_skeleton(path: Path, skeletons: list[Usd.Prim], skel: str | None) -> Usd.Prim:
     """Return the skeleton that ``skel`` means, or the one that is there; see `find_character`."""
-    names = ", ".join(str(s.GetPath()) for s in skeletons)
+    paths = [str(s.GetPath()) for s in skeletons]
+    names = ", ".join(paths[:MOST_NAMED]) + (", ..." if len(paths) > MOST_NAMED else "")
     if skel is None:
         animated = [s for s in skeletons if bound_animation(s)]
         if len(skeletons) == 1:
