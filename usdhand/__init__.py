@@ -24,10 +24,12 @@ __all__ = [
     "read_library",
     "read_rig",
     "reduce_hands",
+    "splice_hands",
     "write_clip",
     "write_filled",
     "write_library",
     "write_rig",
+    "write_spliced",
 ]
 
 

@@ -32,11 +32,16 @@ _HOME = {
     "read_library": "usdhand.api.filling",
     "read_rig": "usdhand.api.reducing",
     "reduce_hands": "usdhand.api.reducing",
+    "Pin": "usdhand.splice",
+    "SpliceSettings": "usdhand.splice",
+    "parse_pin": "usdhand.api.splicing",
     "reduction_target": "usdhand.api.reducing",
+    "splice_hands": "usdhand.api.splicing",
     "write_clip": "usdhand.api.clips",
     "write_filled": "usdhand.api.filling",
     "write_library": "usdhand.api.filling",
     "write_rig": "usdhand.api.reducing",
+    "write_spliced": "usdhand.api.splicing",
 }
 
 __all__ = list(_HOME)

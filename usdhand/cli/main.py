@@ -17,6 +17,7 @@ VERBS = {
     "expand": "Turn a reduced rig back into motion, on its own or another character.",
     "library": "Build a motion library, and show what is in one.",
     "fill": "Give a body clip the fingers of similar motions from a library.",
+    "splice": "Put the fingers of a hand clip on a body clip, retimed to it.",
     "evaluate": "Measure how well a library tells fingers from arms.",
     "compare": "Compare two motions: degrees, fingertips, smoothness, lag.",
     "check": "Check files with UsdValidation and rules of our own.",

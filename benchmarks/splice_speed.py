@@ -1,0 +1,153 @@
+"""Time and memory of aligning one hand: 3000 and 36000 frames, and the paper's 569.
+
+Run: python benchmarks/splice_speed.py [--takes FOLDER] [--peer]
+
+The motion is real takes one after the other, often enough; the hand clip is the same motion with a
+smooth warp. With --peer, pass 1 as the paper prints it is timed at 3000 frames: a numpy cost matrix
+and dtw-python (GPL, not a dependency). Every length runs in a process of its own, whose peak memory
+above that of the clips is measured. Times include everything from the markers to both passes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import resource
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from usdhand import api
+from usdhand.splice.markers import Markers, hand_markers
+from usdhand.splice.method import SpliceSettings, align, pinned_band, smooth_warp
+from usdhand.splice.phases import smoothed
+
+HERE = Path(__file__).resolve().parent.parent
+REAL = HERE.parent / "shared" / "data" / "studiogalt" / "full"
+SETTINGS = SpliceSettings()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--takes", type=Path, default=REAL if REAL.is_dir() else HERE / "samples" / "gestures"
+    )
+    parser.add_argument("--peer", action="store_true")
+    arguments = parser.parse_args()
+    takes = markers_of(arguments.takes)
+    print("frames  seconds  cells of pass 1  ns a cell  peak MB above the clips")
+    seconds: dict[int, float] = {}
+    context = multiprocessing.get_context("spawn")
+    for frames in (569, 3000, 36000):
+        with context.Pool(1) as pool:
+            seconds[frames], cells, memory = pool.apply(measured, (takes, frames))
+        per_cell = 1e9 * seconds[frames] / cells
+        print(f"{frames:6d}  {seconds[frames]:7.3f}  {cells:15d}  {per_cell:9.2f}  {memory:8.0f}")
+    if arguments.peer:
+        theirs = peer_seconds(*pair(takes, 3000))
+        print(
+            f"numpy cost matrix and dtw-python at 3000 frames: {theirs:.2f} s, "
+            f"{theirs / seconds[3000]:.0f} times as long"
+        )
+
+
+def markers_of(folder: Path) -> list[Markers]:
+    found = []
+    for path in sorted(folder.glob("*.usdc")):
+        clip = api.read_clip(path)
+        hands = api.find_hands(clip)
+        if "right" in hands.frames:
+            found.append(hand_markers(clip, hands, "right", SETTINGS.fps))
+    return found
+
+
+def pair(takes: list[Markers], frames: int) -> tuple[Markers, Markers]:
+    """Two marker motions of that many frames, the second a warp of the first."""
+    order = np.random.default_rng(0).choice(len(takes), size=1 + frames // 100)
+    body = replace(
+        takes[0],
+        **{
+            name: np.concatenate([getattr(takes[k], name) for k in order])[:frames]
+            for name in ("positions", "wrist", "forearm")
+        },
+    )
+    noise = np.random.default_rng(1).normal(size=frames)
+    warp = np.clip(smooth_warp(np.cumsum(1.0 + noise), 60.0), 0, None)
+    at = np.rint(warp * (frames - 1) / warp[-1]).astype(int)
+    hand = replace(
+        body, positions=body.positions[at], wrist=body.wrist[at], forearm=body.forearm[at]
+    )
+    return body, hand
+
+
+def measured(takes: list[Markers], frames: int) -> tuple[float, int, float]:
+    """Seconds, cells of pass 1, and MB of peak memory above what the clips take."""
+    short = pair(takes, 300)
+    align(*short, SETTINGS, (), np.arange(300) / SETTINGS.fps)  # compiled
+    body, hand = pair(takes, frames)
+    band = pinned_band(((0, 0, 0), (frames - 1, frames - 1, 0)), SETTINGS.band[0] * frames)
+    before = peak_mb()
+    best = np.inf
+    for _ in range(1 if frames > 10000 else 5):
+        start = time.perf_counter()
+        align(body, hand, SETTINGS, (), np.arange(frames) / SETTINGS.fps)
+        best = min(best, time.perf_counter() - start)
+    return best, band.cells, peak_mb() - before
+
+
+def peak_mb() -> float:
+    scale = 1e6 if sys.platform == "darwin" else 1e3
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / scale
+
+
+def peer_seconds(body: Markers, hand: Markers) -> float:
+    """Seconds that pass 1 as printed takes with a numpy cost matrix and dtw-python."""
+    import dtw
+
+    start = time.perf_counter()
+    window = {"window_size": int(SETTINGS.band[0] * len(body) / np.sqrt(2))}
+    dtw.dtw(
+        sign_costs(body, hand),
+        step_pattern="symmetric1",
+        window_type="slantedband",
+        window_args=window,
+    )
+    return time.perf_counter() - start
+
+
+def sign_costs(body: Markers, hand: Markers) -> np.ndarray:
+    """Costs (rows, columns) of equations (6) and (7) in numpy."""
+    deviation = SETTINGS.smoothing * SETTINGS.fps
+    windows = []
+    for markers in (body, hand):
+        positions = smoothed(markers.positions, deviation)[..., [0, 2]].astype(np.float32)
+        padded = np.pad(positions, ((2, 2), (0, 0), (0, 0)), mode="edge")
+        five = np.stack([padded[k : k + len(markers)] for k in range(5)], axis=1)
+        five = five - five.mean(axis=(1, 2), keepdims=True)
+        windows.append(five.reshape(len(markers), -1, 2))
+    (px, pz), (qx, qz) = (np.moveaxis(w, 2, 0) for w in windows)
+    cosine, sine = px @ qx.T + pz @ qz.T, px @ qz.T - pz @ qx.T
+    length = np.hypot(cosine, sine)
+    cosine, sine = cosine / length, sine / length
+    total = np.zeros(length.shape)
+    for order in (1, 2):
+        p, q = (smoothed(m.positions, deviation, order).astype(np.float32) for m in (body, hand))
+        limits = [SETTINGS.dead_zone * np.sqrt(np.mean(np.sum(v**2, axis=-1))) for v in (p, q)]
+        for k in range(4):
+            x, y, z = q[:, k].T
+            turned = cosine * x + sine * z, np.broadcast_to(y, total.shape), cosine * z - sine * x
+            for axis, theirs in enumerate(turned):
+                ours = signs(p[:, k, axis], limits[0])[:, None]
+                total += (ours - signs(theirs, limits[1])) ** 2
+    return total
+
+
+def signs(values: np.ndarray, limit: float) -> np.ndarray:
+    return (values > limit).astype(np.float32) - (values < -limit)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,152 @@
+"""usdhand splice: files in, files out, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from conftest import REPOSITORY
+from pxr import Usd
+
+from usdhand.api import find_hands, read_clip
+from usdhand.api.splicing import parse_pin, splice_hands
+from usdhand.cli.splice import command
+from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
+from usdhand.splice import SpliceSettings
+
+SAMPLES = REPOSITORY / "samples"
+BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
+FULL = SAMPLES / "conversations" / "talk_01_full.usdc"
+HANDS = SAMPLES / "hands" / "talk_01_hands_a.usdc"
+RIGHT = SAMPLES / "hands" / "talk_01_hands_right.usdc"
+OTHER_RIG = SAMPLES / "gestures_ben"
+PINS = ("--pin", "1:1", "--pin", "181:403")
+Run = Callable[..., Result]
+
+
+@pytest.fixture
+def run() -> Run:
+    def call(*arguments: object, code: int = 0) -> Result:
+        result = CliRunner().invoke(command, [str(a) for a in arguments])
+        if isinstance(result.exception, UsdHandError):
+            assert result.exception.exit_code == code, result.exception
+            return result
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        assert result.exit_code == code, result.output
+        return result
+
+    return call
+
+
+def test_forearms_filmed_again_give_the_true_fingers(run: Run, tmp_path: Path) -> None:
+    """Other amplitude, timing, direction, rate and no shoulders: within 2 degrees RMS."""
+    out, report = tmp_path / "talk.usda", tmp_path / "talk.json"
+    text = run(BODY, HANDS, *PINS, "-o", out, "--report", report).output
+    assert "the room" in text
+    clip, true = read_clip(out), read_clip(FULL)
+    ours, theirs = (find_hands(c).encode(c) for c in (clip, true))
+    difference = (ours.values - theirs.select(ours.names).values)[1:179]
+    assert np.sqrt(np.mean(difference**2)) < 2.0
+
+    result = json.loads(report.read_text())
+    assert result["schema"] == "usdhand.splice/1"
+    hand = result["hands"]["right"]
+    assert len(hand["warp"]) == len(clip)
+    assert hand["pins"][1]["body"] == pytest.approx(6.0)
+    assert set(hand) >= {"warp", "pins", "cost", "pass_lag", "phases", "look_at", "channels"}
+    stage = Usd.Stage.Open(str(out))
+    scope = next(p for p in stage.Traverse() if p.GetName() == "HandSplice")
+    warp = scope.GetAttribute("usdhand:warp:right")
+    assert len(warp.GetTimeSamples()) == len(clip)
+    assert warp.Get(clip.time_codes[90]) == pytest.approx(hand["warp"][90][1], abs=1e-5)
+    body = read_clip(BODY)
+    wrist = find_hands(body).character.hands["left"].wrist
+    assert np.array_equal(clip.rotations[:, wrist], body.rotations[:, wrist])
+
+
+def test_one_hand(run: Run, tmp_path: Path) -> None:
+    pins = ("--pin", "right:391:1", "--pin", "right:571:378:6")
+    result = run(BODY, RIGHT, *pins, "-o", tmp_path / "o.usdc", "--json")
+    assert list(json.loads(result.stdout)["hands"]) == ["right"]
+    with pytest.raises(HandNotFoundError):
+        splice_hands(read_clip(BODY), read_clip(RIGHT), sides=["left"])
+
+
+def test_another_rig(run: Run, tmp_path: Path) -> None:
+    """Ben, metres and Z up, makes Ada's gesture: his fingers come in her joints and time."""
+    theirs = next(iter(sorted(OTHER_RIG.glob("ok_*.usdc"))))
+    ours = SAMPLES / "gestures" / "ok_01.usdc"
+    out = tmp_path / "ok.usdc"
+    run(ours, theirs, "-o", out, "--wrist", "hands", "--flatten")
+    a, b = read_clip(out), read_clip(theirs)
+    hands_a, hands_b = find_hands(a), find_hands(b)
+    result = splice_hands(read_clip(ours), b)
+    warp = result.hands["right"].warp[:, 1] * b.fps
+    name = "riIndexPIPy"
+    got = hands_a.encode(a).select([name]).values[:, 0]
+    wanted = hands_b.encode(b).select([name]).values[:, 0]
+    expected = np.interp(warp, np.arange(len(b)), wanted)
+    assert np.sqrt(np.mean((got - expected) ** 2)) < 2.0
+
+
+def test_dry_run_writes_nothing(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "o.usda"
+    run(BODY, HANDS, *PINS, "-o", out, "-n")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--pin", "1:1", "--pin", "9000:10"), "9000 is outside of the body"),
+        (("--pin", "1:1", "--pin", "10:9000"), "9000 is outside of the hand"),
+        (("--pin", "100:200", "--pin", "120:100"), "cross"),
+        (("--pin", "100:200", "--pin", "100:100"), "contradict"),
+        (("--pin", "100"), "'100' is no pin"),
+        (("--pin", "a:b"), "'a:b' is no pin"),
+        (("--band", "0.3"), "two numbers"),
+        (("--band", "0,2"), "above 0"),
+        ((), "beyond the band"),
+    ],
+)
+def test_refused_with_a_reason(
+    run: Run, tmp_path: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    out = tmp_path / "o.usda"
+    result = run(BODY, HANDS, *arguments, "-o", out, code=2)
+    assert message in str(result.exception)
+    assert not out.exists()
+
+
+def test_pins_are_read_in_the_time_codes_of_their_clips() -> None:
+    body, hands = read_clip(BODY), read_clip(HANDS)
+    pin = parse_pin("left:31:121:6", body, hands)
+    assert (pin.side, pin.body, pin.hand) == ("left", pytest.approx(1.0), pytest.approx(2.0))
+    assert pin.tolerance == pytest.approx(0.1)
+    assert str(pin) == "left:31:121:6"
+
+
+def test_hands_that_do_not_move() -> None:
+    body = read_clip(FULL)
+    still = replace(body, rotations=np.repeat(body.rotations[:1], len(body), axis=0), name="still")
+    with pytest.raises(InputError, match="nothing tells"):
+        splice_hands(body, still)
+    short = replace(still, rotations=still.rotations[:2])
+    with pytest.raises(InputError, match="2 frames"):
+        splice_hands(body, short)
+
+
+def test_long_differences_are_worth_a_warning() -> None:
+    body, hands = read_clip(BODY), read_clip(HANDS)
+    result = splice_hands(body, hands, pins=["1:1", "181:403"])
+    assert any("factor of 2" in note for note in result.notes)
+    with pytest.raises(UsageError, match="not spliced"):
+        splice_hands(body, read_clip(RIGHT), pins=["left:1:1"])
+    with pytest.raises(UsageError, match="trunk"):
+        splice_hands(body, hands, SpliceSettings(align="trunk"), pins=["1:1", "181:403"])

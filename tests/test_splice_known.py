@@ -1,0 +1,196 @@
+"""Splice on pairs whose true alignment is known: samples always, real takes where they are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY, shared_data
+from known_pairs import Pair, known_pair, known_pairs, natural_offset
+
+from usdhand.api import find_hands, read_clip
+from usdhand.motion import rotations as rot
+from usdhand.motion.resample import resample
+from usdhand.splice import Pin, Spliced, SpliceSettings, splice
+from usdhand.splice.markers import Markers
+from usdhand.splice.method import align
+
+SAMPLES = REPOSITORY / "samples"
+VISIBLE_S = 0.1  # Joerg, Hodgins & O'Sullivan 2010
+
+
+@cache
+def sample() -> Pair:
+    path = SAMPLES / "conversations" / "talk_01_full.usdc"
+    return known_pair(path, path, 3)
+
+
+@cache
+def real(index: int) -> Pair:
+    folder = shared_data("studiogalt", "full")
+    return known_pair(*known_pairs(folder)[index], 1000 + index)
+
+
+def spliced(pair: Pair, settings: SpliceSettings | None = None) -> Spliced:
+    return splice(pair.body, pair.hands, pair.body_hands, pair.hand_hands, settings)
+
+
+def check(pair: Pair) -> None:
+    result = spliced(pair)
+    true = pair.source_channels()
+    for side, alignment in result.hands.items():
+        moving = pair.moving(side)
+        full = np.abs(pair.error(alignment.warp[:, 1])[moving])
+        first = np.abs(pair.error(alignment.phase_warp)[moving])
+        assert np.median(full) < 0.025
+        assert np.percentile(full, 95) < 0.08
+        assert full.max() < VISIBLE_S
+        assert np.median(full) < 1.5 * np.median(first) + 0.003
+        assert (np.diff(alignment.warp[:, 1]) >= 0).all()
+        ours = pair.body_hands.encode(result.clip).select(alignment.channels).values
+        assert np.sqrt(np.mean((ours - true.select(alignment.channels).values) ** 2)) < 2.0
+
+
+def test_a_sample_conversation() -> None:
+    check(sample())
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("index", [0, 6, 20, 40])
+def test_real_takes(index: int) -> None:
+    check(real(index))
+
+
+@pytest.mark.real_data
+def test_both_rigs_of_a_take_within_a_frame_without_being_told() -> None:
+    mini = shared_data("studiogalt", "mini")
+    for name in (
+        "SG_ASL_Abate_2_2023_2_3",
+        "SG_ASL_Abnormal_2_2023_2_6",
+        "SG_ASL_Abscond_2023_2_8",
+    ):
+        a, b = read_clip(mini.parent / "full" / f"{name}.usdc"), read_clip(mini / f"{name}.usdc")
+        hands_a, hands_b = find_hands(a), find_hands(b)
+        first, second = natural_offset(a, b, hands_a, hands_b)
+        result = splice(a, b, hands_a, hands_b)
+        pair = Pair(name, a, b, hands_a, hands_b, b, np.empty(0))
+        for side, alignment in result.hands.items():
+            frames = np.flatnonzero(pair.moving(side))
+            off = alignment.warp[frames, 1] * b.fps - (frames - first + second)
+            assert np.abs(off).max() <= 1.0
+
+
+def test_only_fingers_change_and_nothing_pops() -> None:
+    pair = sample()
+    result = spliced(pair)
+    fingers = [int(j) for f in pair.body_hands.frames.values() for j in f.joints]
+    others = np.setdiff1d(np.arange(len(pair.body.skeleton)), fingers)
+    assert np.array_equal(result.clip.rotations[:, others], pair.body.rotations[:, others])
+    assert result.clip.translations is pair.body.translations
+
+    def largest_acceleration(rotations: np.ndarray) -> float:
+        turn = rot.to_rotation_vector(rot.multiply(rot.conjugate(rotations[:-1]), rotations[1:]))
+        return float(np.linalg.norm(np.diff(turn[:, fingers], axis=0), axis=-1).max())
+
+    ours = largest_acceleration(result.clip.rotations)
+    assert ours < 1.5 * largest_acceleration(pair.source.rotations)
+
+
+def test_a_pin_moves_the_warp_only_around_it() -> None:
+    pair = sample()
+    free = spliced(pair).hands["right"].warp
+    at = 340
+    pins = (Pin(free[at, 0], free[at, 1] + 0.2), Pin(*free[250]), Pin(*free[430]))
+    pinned = spliced(pair, SpliceSettings(pins=pins)).hands["right"].warp
+    assert abs(pinned[at, 1] - free[at, 1] - 0.2) < 1e-6
+    apart = np.abs(pinned[:, 1] - free[:, 1])
+    assert apart[:250].max() < 0.03
+    assert apart[431:].max() < 0.03
+    loose = (replace(pins[0], tolerance=0.15), *pins[1:])
+    held = spliced(pair, SpliceSettings(pins=loose)).hands["right"].warp
+    assert 0.05 - 1e-6 <= abs(held[at, 1] - free[at, 1]) <= 0.35
+    one_hand = SpliceSettings(pins=(replace(pins[0], side="right"),))
+    hands = spliced(pair, one_hand).hands
+    assert np.array_equal(hands["left"].warp, spliced(pair).hands["left"].warp)
+
+
+def test_every_frame_pinned_is_full_control() -> None:
+    pair = sample()
+    pins = tuple(
+        Pin(t, s)
+        for t, s in zip(np.arange(len(pair.body)) / pair.body.fps, pair.truth, strict=True)
+    )
+    end = pair.hands.duration
+    pins = tuple(replace(p, hand=min(p.hand, end)) for p in pins)
+    for alignment in spliced(pair, SpliceSettings(pins=pins)).hands.values():
+        assert np.abs(alignment.warp[:, 1] - [p.hand for p in pins]).max() < 1e-9
+
+
+def test_counting_every_left_step() -> None:
+    """The paper's example: the hand counts to three while the body waves six times.
+
+    Without pins, every count is spread over two waves. Pins let it count every second wave: there
+    the count has the timing of the wave, and waits for the other one.
+    """
+    body, hands = waves(6), waves(3)
+    times = np.arange(len(body)) / 60.0
+    pins = [Pin(t, s) for k in range(3) for t, s in ((2.0 * k, k), (2.0 * k + 1.0, k + 1.0))][1:]
+    free, _, _ = align(body, hands, SpliceSettings(), (), times)
+    pinned, _, _ = align(body, hands, SpliceSettings(), pins, times)
+    for wave in range(6):
+        inside = (times > wave + 0.2) & (times < wave + 0.8)
+        wanted = times[inside] - (wave + 1) // 2 if wave % 2 == 0 else np.full(36, wave // 2 + 1.0)
+        wanted = wanted[: inside.sum()]
+        off = np.abs(pinned[inside] - wanted)
+        assert off.max() < 0.12, wave
+    middle = np.interp(2.5, times, free)
+    assert abs(middle - np.interp(2.5, times, pinned)) > 0.1
+
+
+def waves(count: int) -> Markers:
+    """Markers of a hand that rises and comes down again once a second, resting in between."""
+    t = np.arange(60 * count + 1) / 60.0
+    phase = np.clip((t % 1.0 - 0.2) / 0.6, 0.0, 1.0)
+    up = 20.0 * np.sin(np.pi * phase) ** 2
+    wrist = np.stack([10.0 * np.sin(2 * np.pi * phase), up, 0.3 * up], axis=1)
+    around = np.array([[3.0, 0.0, 0.0], [-3.0, 0.0, 0.0], [0.0, 0.0, -8.0], [0.0, 0.0, 8.0]])
+    forearm = np.tile([0.0, 0.0, 1.0], (len(t), 1))
+    return Markers(wrist[:, None] + around, wrist, forearm, None, 60.0, "shoulder")
+
+
+def test_wrists_come_along_where_wanted() -> None:
+    pair = sample()
+    hands = resample(pair.source, 60.0)
+    result = splice(
+        pair.body, hands, pair.body_hands, find_hands(hands), SpliceSettings(wrist="hands")
+    )
+    for hand in pair.body_hands.character.hands.values():
+        turned = rot.angle_between(
+            result.clip.rotations[:, hand.wrist], pair.source.rotations[:, hand.wrist]
+        )
+        assert turned.max() < 3.0
+    other = pair.body.rotations.copy()
+    other[:, [h.wrist for h in pair.body_hands.character.hands.values()]] = rot.IDENTITY
+    fixed = splice(
+        pair.body.with_rotations(other),
+        hands,
+        pair.body_hands,
+        find_hands(hands),
+        SpliceSettings(wrist="hands"),
+    )
+    for side, hand in pair.body_hands.character.hands.items():
+        at = fixed.hands[side].warp[:, 1] * 30.0
+        wanted = pair.source.rotations[np.rint(at).astype(int), hand.wrist]
+        apart = rot.angle_between(fixed.clip.rotations[:, hand.wrist], wanted)
+        assert np.median(apart) < 2.0
+
+
+@pytest.mark.parametrize("how", ["local", "trunk"])
+def test_a_turned_clip_is_aligned_as_well(how: str) -> None:
+    pair = sample()
+    result = spliced(pair, SpliceSettings(align=how))  # type: ignore[arg-type]
+    for side, alignment in result.hands.items():
+        error = np.abs(pair.error(alignment.warp[:, 1])[pair.moving(side)])
+        assert np.median(error) < 0.025

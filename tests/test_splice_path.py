@@ -1,0 +1,187 @@
+"""The compiled warp of splice against Algorithm 1 of the paper, and its band and pins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from oracle_2006 import algorithm_1, best_turn, distance_of_signs
+from scipy.spatial.transform import Rotation
+
+from usdhand.alignment.phase_dtw import phase_path, signs_along, tethered_path, turn_angles
+from usdhand.errors import UsageError
+from usdhand.splice.band import Pin, anchors_of, band_along, checked_pins, pinned_band
+from usdhand.splice.method import through_pins
+
+NO_TURN = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
+
+
+def words(signs: np.ndarray) -> np.ndarray:
+    """Signs (frames, n) as bits (2, frames)."""
+    bits = np.uint64(1) << np.arange(signs.shape[1], dtype=np.uint64)
+    return np.stack([((signs == s) * bits).sum(axis=1, dtype=np.uint64) for s in (1, -1)])
+
+
+def cells(first: np.ndarray, last: np.ndarray) -> list[tuple[int, int]]:
+    return [
+        (i, j) for i, (a, b) in enumerate(zip(first, last, strict=True)) for j in range(a, b + 1)
+    ]
+
+
+@st.composite
+def problems(draw):
+    n, m = draw(st.integers(8, 30)), draw(st.integers(8, 30))
+    count = draw(st.integers(1, 64))  # few signs: many ties
+    seed = draw(st.integers(0, 2**32 - 1))
+    width = draw(st.sampled_from([4.0, 8.0, 14.0, 40.0]))
+    pins = []
+    for _ in range(draw(st.integers(0, 3))):
+        x = draw(st.integers(1, n - 2))
+        if all(abs(x - p[0]) > 1 for p in pins):
+            pins.append((x, draw(st.integers(0, m - 1)), draw(st.integers(0, 2))))
+    pins.sort()
+    pins = [p for k, p in enumerate(pins) if k == 0 or p[1] >= max(q[1] for q in pins[:k])]
+    return n, m, count, seed, width, pins
+
+
+@given(problems())
+def test_agrees_with_algorithm_1(problem) -> None:
+    n, m, count, seed, width, pins = problem
+    random = np.random.default_rng(seed)
+    p, q = random.integers(-1, 2, (n, count)), random.integers(-1, 2, (m, count))
+    anchors = ((0, 0, 0), *pins, (n - 1, m - 1, 0))
+    band = pinned_band(anchors, width)
+    first, last, cost = phase_path(words(p), words(q)[None], *NO_TURN, band.low, band.high)
+    wanted, path = algorithm_1(lambda i, j: distance_of_signs(p[i], q[j]), n, m, width, pins)
+    assert cost == wanted
+    assert cells(first, last) == path
+    assert cost == sum(distance_of_signs(p[i], q[j]) for i, j in path)
+    for x, y, tolerance in pins:  # the path passes, at most one diagonal step beside
+        assert last[x] <= y + tolerance
+        assert first[x + 1] >= y - tolerance
+
+
+def test_turns_are_the_papers() -> None:
+    """Every cell block takes, of the turns there are, the one nearest to equation (7)."""
+    random = np.random.default_rng(1)
+    angles = turn_angles(64)
+    assert np.allclose(np.diff(np.unwrap(angles)), 2 * np.pi / 64, rtol=0.5)
+    for _ in range(20):
+        p, q = random.normal(size=(2, 20, 2))
+        wanted = best_turn(p, q)
+        # A column's sign word is the number of its turn; the body's word makes the cost tell it.
+        hand = np.zeros((64, 2, 8), np.uint64)
+        hand[:, 0, :] = ((np.uint64(1) << np.arange(64, dtype=np.uint64)) - np.uint64(1))[:, None]
+        first, _, cost = phase_path(
+            np.zeros((2, 1), np.uint64),
+            hand,
+            (p - p.mean(axis=0)).T[None].astype(np.float32),
+            np.repeat(q.T[:, :, None], 2, axis=2).astype(np.float32),
+            np.array([0]),
+            np.array([0]),
+        )
+        assert first[0] == 0
+        away = np.angle(np.exp(1j * (angles[cost] - wanted)))
+        assert abs(away) < np.radians(4.0)
+
+
+def test_signs_after_a_turn_are_those_of_turned_vectors() -> None:
+    vectors = np.random.default_rng(2).normal(size=(50, 1, 3))
+    turned = Rotation.from_euler("y", 40, degrees=True).apply(vectors[:, 0])[:, None]
+    from usdhand.splice.phases import _about_vertical
+
+    axes = np.eye(3)[None, None]
+    plain = np.zeros((1, 2, 50), np.uint64)
+    after = np.zeros((1, 2, 50), np.uint64)
+    signs_along(
+        np.moveaxis(turned, 0, 2).astype(np.float32).copy(), axes.astype(np.float32), 0.1, plain
+    )
+    back = _about_vertical(axes, -np.radians(40))
+    signs_along(
+        np.moveaxis(vectors, 0, 2).astype(np.float32).copy(), back.astype(np.float32), 0.1, after
+    )
+    assert np.array_equal(plain, after)
+    assert plain.any()
+
+
+def test_a_long_path_through_a_narrow_band() -> None:
+    n = 20000
+    p = np.random.default_rng(3).integers(0, 2**63, (2, n)).astype(np.uint64)
+    p[1] &= ~p[0]
+    band = pinned_band(((0, 0, 0), (n - 1, n - 1, 0)), 400.0)
+    first, last, cost = phase_path(p, p[None], *NO_TURN, band.low, band.high)
+    assert cost == 0
+    assert (first == np.arange(n)).all()
+    assert (last == first).all()
+
+
+def test_tethered_path_finds_a_shift_and_stays_without_one() -> None:
+    t = np.linspace(0, 6 * np.pi, 300)
+    hand = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+    centre = np.arange(300.0)
+    shift = 3.0 * np.sin(np.pi * np.arange(300) / 299)
+    body = np.stack(
+        [
+            np.cos(np.interp(centre + shift, centre, t)),
+            np.sin(np.interp(centre + shift, centre, t)),
+            0 * t,
+        ],
+        axis=1,
+    )
+    found = tethered_path(body, hand, centre, 16, 0.5, 0.02, 8.0)
+    assert np.abs(found - shift).max() < 0.6
+    still = np.tile([1.0, 0.0, 0.0], (300, 1))
+    assert not tethered_path(still, still, centre, 16, 0.5, 0.02, 8.0).any()
+
+
+def test_pins_that_cannot_hold_are_named() -> None:
+    def check(*pins: Pin) -> tuple[Pin, ...]:
+        return checked_pins(pins, "left", 10.0, 8.0)
+
+    with pytest.raises(UsageError, match=r"late.*body clip"):
+        check(Pin(11.0, 1.0, name="late"))
+    with pytest.raises(UsageError, match=r"early.*hand clip"):
+        check(Pin(1.0, -0.5, name="early"))
+    with pytest.raises(UsageError, match="a and b cross"):
+        check(Pin(2.0, 5.0, name="a"), Pin(3.0, 4.0, name="b"))
+    with pytest.raises(UsageError, match="a and b contradict"):
+        check(Pin(2.0, 4.0, name="a"), Pin(2.0, 5.0, name="b"))
+    with pytest.raises(UsageError, match="tolerance"):
+        check(Pin(2.0, 4.0, -1.0))
+    both = check(Pin(3.0, 4.0), Pin(2.0, 2.0, side="right"), Pin(2.0, 3.0, side="left"))
+    assert [p.hand for p in both] == [3.0, 4.0]
+
+
+@given(problems())
+def test_every_row_of_a_band_can_be_reached(problem) -> None:
+    n, m, _, _, width, pins = problem
+    band = pinned_band(((0, 0, 0), *pins, (n - 1, m - 1, 0)), width)
+    assert (band.low <= band.high).all()
+    assert (np.diff(band.low) >= 0).all()
+    assert (np.diff(band.high) >= 0).all()
+    assert (band.low[1:] <= band.high[:-1] + 1).all()
+    assert band.low[0] == 0
+    assert band.high[-1] == m - 1
+    near = band_along(np.linspace(0, m - 1, n), band, 1e9)
+    assert near.cells == band.cells
+
+
+def test_pins_on_the_first_and_last_frame_move_the_ends() -> None:
+    pins = Pin(0.0, 1.0), Pin(5.0, 4.0)
+    assert anchors_of(pins, 301, 601, 60.0) == ((0, 60, 0), (300, 240, 0))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6))
+def test_pins_are_met_whatever_the_warp(seed: int, count: int) -> None:
+    random = np.random.default_rng(seed)
+    times = np.arange(200) / 20.0
+    warp = np.sort(random.uniform(0.0, 8.0, 200))
+    frames = np.sort(random.choice(200, count, replace=False))
+    wanted = np.sort(random.uniform(0.0, 8.0, count))
+    slack = random.choice([0.0, 0.3], count)
+    pins = [Pin(times[f], h, s) for f, h, s in zip(frames, wanted, slack, strict=True)]
+    moved = through_pins(warp, times, pins)
+    assert (np.diff(moved) >= 0).all()
+    off = np.abs(moved[frames] - wanted)
+    assert (off <= slack + 1e-9).all()

@@ -1,0 +1,110 @@
+"""The hand clip's fingers, and wrist if wanted, at the warped times on the body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from usdhand.anatomy import Channels, HandFrames, Hands, Side
+from usdhand.anatomy.channels import decode, encode
+from usdhand.motion import Clip, Skeleton, forward_kinematics
+from usdhand.motion import rotations as rot
+from usdhand.motion.resample import interpolate, interpolate_rotations
+from usdhand.motion.rotations import Array
+from usdhand.splice.markers import arm_origin
+from usdhand.splice.phases import smoothed
+
+# Places within the time of one body frame at which a hand clip that runs faster is averaged.
+WITHIN_FRAME = np.array([-1.0, 0.0, 1.0]) / 3.0
+# Changes of the warp's speed, as a share of the usual speed, that show as a jolt of the fingers.
+JOLT = 0.5
+JOLT_FRAMES = 2.0
+
+
+def with_fingers(
+    body: Clip, hand_clip: Clip, frames: HandFrames, hand_frames: HandFrames, warp: Array
+) -> tuple[Clip, tuple[str, ...]]:
+    """The body with the fingers that the hand clip has at the warp's times.
+
+    Parameters
+    ----------
+    warp : (body frames,) seconds of the hand clip from its first frame
+
+    Returns
+    -------
+    clip : the body; channels that one of the hands does not have are left alone
+    names : channels that were taken
+    """
+    own, other = encode(body, frames), encode(hand_clip, hand_frames)
+    theirs = frozenset(other.names)
+    names = tuple(name for name in own.names if name in theirs)
+    times = _times_within(warp) * hand_clip.fps
+    curves = other.select(names).values
+    taken = np.mean([interpolate(curves, t) for t in times], axis=0)
+    taken = _without_jolts(taken, warp)
+    return decode(own.replaced(Channels(names, taken)), body, frames), names
+
+
+def with_wrist(
+    body: Clip, hand_clip: Clip, hands: Hands, hand_hands: Hands, side: Side, warp: Array
+) -> Clip:
+    """The body with the hand clip's rotation of the palm relative to the forearm."""
+    bends = _palm_to_forearm(hand_clip, hand_hands, side)
+    times = _times_within(warp) * hand_clip.fps
+    taken = rot.mean(np.stack([interpolate_rotations(bends, t) for t in times]))
+    taken = rot.make_continuous(taken)
+    wrist = hands.character.hands[side].wrist
+    parent = int(body.skeleton.parents[wrist])
+    elbow, _ = arm_origin(body.skeleton, hands.character.hands[side])
+    pose = forward_kinematics(body, dict.fromkeys([elbow, parent]))
+    forearm = rot.multiply(pose.rotation(elbow), forearm_frame(body.skeleton, hands, side))
+    palm = rot.multiply(forearm, taken)
+    world = rot.multiply(palm, rot.conjugate(hands.frames[side].palm))
+    rotations = body.rotations.copy()
+    rotations[:, wrist] = rot.make_continuous(
+        rot.multiply(rot.conjugate(pose.rotation(parent)), world)
+    )
+    return body.with_rotations(rotations)
+
+
+def forearm_frame(skeleton: Skeleton, hands: Hands, side: Side) -> Array:
+    """Frame (4,) of the forearm in the elbow's axes: the palm's, swung to it at the bind pose."""
+    hand = hands.character.hands[side]
+    elbow, _ = arm_origin(skeleton, hand)
+    axes = rot.from_matrix(skeleton.bind_rotations)
+    palm = rot.multiply(axes[hand.wrist], hands.frames[side].palm)
+    along = skeleton.bind_positions[hand.wrist] - skeleton.bind_positions[elbow]
+    length = np.linalg.norm(along)
+    if length > 1e-6:
+        now = rot.rotate(palm, np.array([0.0, 0.0, 1.0]))
+        palm = rot.multiply(rot.between_vectors(now, along / length), palm)
+    return rot.multiply(rot.conjugate(axes[elbow]), palm)
+
+
+def _palm_to_forearm(clip: Clip, hands: Hands, side: Side) -> Array:
+    hand = hands.character.hands[side]
+    elbow, _ = arm_origin(clip.skeleton, hand)
+    pose = forward_kinematics(clip, dict.fromkeys([elbow, hand.wrist]))
+    forearm = rot.multiply(pose.rotation(elbow), forearm_frame(clip.skeleton, hands, side))
+    palm = rot.multiply(pose.rotation(hand.wrist), hands.frames[side].palm)
+    return rot.make_continuous(rot.multiply(rot.conjugate(forearm), palm))
+
+
+def _times_within(warp: Array) -> Array:
+    """(3, frames) times of the hand clip that fall on every body frame.
+
+    The average over several matched frames is the paper's median for what varies smoothly.
+    """
+    frames = np.arange(len(warp))
+    return np.stack([np.interp(frames + w, frames, warp) for w in WITHIN_FRAME])
+
+
+def _without_jolts(curves: Array, warp: Array) -> Array:
+    """Curves smoothed where, and only where, the speed of the warp jumps."""
+    bend = np.abs(np.diff(warp, n=2, prepend=warp[:1], append=warp[-1:]))
+    bend[[0, -1]] = 0.0
+    usual = max((warp[-1] - warp[0]) / max(len(warp) - 1, 1), 1e-9)
+    jolts = (bend > JOLT * usual).astype(np.float64)
+    if not jolts.any():
+        return curves
+    share = np.minimum(1.0, 6.0 * smoothed(jolts, JOLT_FRAMES))[:, None]
+    return np.asarray(curves + share * (smoothed(curves, JOLT_FRAMES) - curves))

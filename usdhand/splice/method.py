@@ -1,0 +1,314 @@
+"""Splice: a hand clip retimed onto a body clip (Majkowska, Zordan & Faloutsos 2006)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from usdhand.anatomy import SIDES, Hands, Side
+from usdhand.errors import HandNotFoundError, InputError, UsageError
+from usdhand.motion import Clip
+from usdhand.motion.rotations import Array
+from usdhand.splice.band import (
+    Band,
+    Pin,
+    anchors_of,
+    band_along,
+    checked_pins,
+    pinned_band,
+)
+from usdhand.splice.markers import Markers, hand_markers
+from usdhand.splice.merge import with_fingers, with_wrist
+from usdhand.splice.palms import refined
+from usdhand.splice.phases import Align, Directions, phase_path, smoothed, steadied
+from usdhand.splice.quality import Phase, phase_qualities
+
+Wrist = Literal["body", "hands"]
+
+# A hand whose wrist stays within this of its mean, in cm, does not move.
+STILL_CM = 1.0
+# Lengths that differ by more than this factor are worth a warning.
+UNLIKELY_FACTOR = 2.0
+# Beyond this many cells, the way back alone would need a gigabyte.
+MOST_CELLS = 4 * 2**30
+
+
+@dataclass(frozen=True)
+class SpliceSettings:
+    """How clips are aligned; the defaults are the measured best, `PAPER` has the paper's axes.
+
+    Attributes
+    ----------
+    band : widths of the bands of pass 1 and pass 2, as shares of the body's length
+    least_band : seconds that the band of pass 1 has at least: performers of short clips are off
+        by as much as those of long ones
+    pins : moments that belong together
+    align : "local" fits a turn about the vertical wherever motions are compared, "trunk" measures
+        it from the trunks
+    wrist : whose wrist rotation the result has
+    directions : of the derivatives' signs, see `usdhand.splice.phases.sign_axes`
+    fps : rate at which motion is compared
+    smoothing : of positions before derivatives are taken, standard deviation in seconds
+    dead_zone : share of their RMS below which derivatives count as zero
+    palm_smoothing : of the wrists' bend, seconds
+    tether : frames that pass 2 may typically move pass 1 by; 0: no pass 2
+    warp_smoothing : of the warp after pass 1 and after pass 2, frames
+    """
+
+    band: tuple[float, float] = (0.3, 0.1)
+    least_band: float = 1.5
+    pins: tuple[Pin, ...] = ()
+    align: Align = "local"
+    wrist: Wrist = "body"
+    directions: Directions = "spread"
+    fps: float = 60.0
+    smoothing: float = 0.045
+    dead_zone: float = 0.06
+    palm_smoothing: float = 0.03
+    tether: float = 1.5
+    warp_smoothing: tuple[float, float] = (5.0, 4.0)
+
+    def __post_init__(self) -> None:
+        if not all(0.0 < width <= 1.0 for width in self.band):
+            raise UsageError("Bands are shares of the body's length: above 0 and at most 1.")
+
+
+# Signs along x, y and z only, as the paper has them.
+PAPER = SpliceSettings(directions="axes")
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """One hand's alignment.
+
+    Attributes
+    ----------
+    warp : (body frames, 2) seconds of the body and of the hand clip, from their first frames
+    phase_warp : (body frames,) seconds of the hand clip after pass 1
+    pins : that held
+    cost : of the path of pass 1, mean over the body's frames
+    phases : how well each phase of the motion agrees
+    origins : joints that the markers of body and hand clip were measured from
+    taken_from : the other side, where this hand hardly moves and follows it
+    channels : finger channels that were taken
+    """
+
+    warp: Array
+    phase_warp: Array
+    pins: tuple[Pin, ...]
+    cost: float
+    phases: tuple[Phase, ...]
+    origins: tuple[str, str]
+    taken_from: Side | None = None
+    channels: tuple[str, ...] = ()
+
+    @property
+    def pass_lag(self) -> float:
+        """Median seconds by which pass 2 moved the warp of pass 1."""
+        return float(np.median(np.abs(self.warp[:, 1] - self.phase_warp)))
+
+
+@dataclass(frozen=True, eq=False)
+class Spliced:
+    """The body with the hand clip's fingers, how each hand was aligned, and what was odd."""
+
+    clip: Clip
+    hands: Mapping[Side, Alignment]
+    notes: tuple[str, ...] = ()
+
+
+def splice(
+    body: Clip,
+    hand_clip: Clip,
+    body_hands: Hands,
+    hand_hands: Hands,
+    settings: SpliceSettings | None = None,
+) -> Spliced:
+    """Give a body clip the fingers of a hand clip of the same performance.
+
+    Hands that both clips have are aligned each on its own.
+
+    Raises
+    ------
+    HandNotFoundError
+        if the clips have no hand in common.
+    InputError
+        if no hand moves, so that there is nothing to align.
+    UsageError
+        if pins cannot hold, or the clips' lengths are too different.
+    """
+    settings = settings or SpliceSettings()
+    sides = [s for s in SIDES if s in body_hands.frames and s in hand_hands.frames]
+    if not sides:
+        there = (" and ".join(h.frames) for h in (body_hands, hand_hands))
+        raise HandNotFoundError(
+            "The clips have no hand in common: the body has {}, the hand clip {}.".format(*there)
+        )
+    pins = {s: checked_pins(settings.pins, s, body.duration, hand_clip.duration) for s in sides}
+    for pin in settings.pins:
+        if pin.side is not None and pin.side not in sides:
+            raise UsageError(f"Pin {pin} is for the {pin.side} hand, which is not spliced.")
+    notes = list(_checked_lengths(body, hand_clip, settings, any(pins.values())))
+    found, more = _aligned_hands(body, hand_clip, body_hands, hand_hands, settings, pins)
+    notes += more
+    clip, hands = body, {}
+    for side, alignment in found.items():
+        warp = alignment.warp[:, 1]
+        if settings.wrist == "hands":
+            clip = with_wrist(clip, hand_clip, body_hands, hand_hands, side, warp)
+        frames, other = body_hands.frames[side], hand_hands.frames[side]
+        clip, names = with_fingers(clip, hand_clip, frames, other, warp)
+        hands[side] = replace(alignment, channels=names)
+    return Spliced(clip, hands, tuple(notes))
+
+
+def align(
+    body: Markers, hand: Markers, settings: SpliceSettings, pins: Sequence[Pin], times: Array
+) -> tuple[Array, Array, int]:
+    """Seconds of the hand clip (times,) after pass 2 and after pass 1, and the cost of pass 1."""
+    band = _band(len(body), len(hand), settings, pins)
+    signs = settings.smoothing, settings.dead_zone
+    path = phase_path(body, hand, band, *signs, settings.align, settings.directions)
+    if settings.align == "local":
+        reach = max(settings.band[1] * len(body) / 2, settings.least_band * settings.fps / 2)
+        near = band_along(path.middle, band, reach)
+        path = steadied(body, hand, path, near, *signs, settings.directions)
+    own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps
+
+    def in_time(warp: Array) -> Array:
+        seconds = np.clip(np.interp(times, own_times, warp / hand.fps), 0.0, end)
+        return through_pins(seconds, times, pins)
+
+    first = monotone(smooth_warp(path.open_ended, settings.warp_smoothing[0]))
+    if settings.tether == 0:
+        return in_time(first), in_time(first), path.cost
+    width = settings.band[1] * len(body)
+    second = refined(body, hand, first, width, settings.palm_smoothing, settings.tether)
+    second = monotone(smooth_warp(second, settings.warp_smoothing[1]))
+    return in_time(second), in_time(first), path.cost
+
+
+def smooth_warp(warp: Array, deviation: float) -> Array:
+    """Warp (rows,) smoothed by a Gaussian, its ends and its mean slope kept."""
+    line = np.linspace(warp[0], warp[-1], len(warp))
+    return np.asarray(line + smoothed(warp - line, deviation))
+
+
+def monotone(warp: Array) -> Array:
+    """Warp that never runs backward, by the mean of the bounds from either side."""
+    return np.asarray((np.maximum.accumulate(warp) + np.minimum.accumulate(warp[::-1])[::-1]) / 2)
+
+
+def through_pins(warp: Array, times: Array, pins: Sequence[Pin]) -> Array:
+    """Warp moved so that it goes through every pin within its tolerance, and exactly where 0.
+
+    What is missing at the pins is spread linearly over the time between them; nothing passes a pin
+    before its time.
+    """
+    if not pins:
+        return warp
+    at = np.array([p.body for p in pins])
+    wanted = np.array([p.hand for p in pins])
+    slack = np.array([p.tolerance for p in pins])
+    off = wanted - np.interp(at, times, warp)
+    missing = np.sign(off) * np.maximum(np.abs(off) - slack, 0.0)
+    ends = (times[0] - 1e-9, times[-1] + 1e-9)
+    knots, values = np.array([ends[0], *at, ends[1]]), np.array([0.0, *missing, 0.0])
+    lowest = np.maximum.accumulate([-np.inf, *(wanted - slack)])
+    highest = np.minimum.accumulate([np.inf, *(wanted + slack)[::-1]])[::-1]
+    least = lowest[np.searchsorted(at, times, "right")]
+    most = highest[np.searchsorted(at, times, "left")]
+    moved = np.clip(warp + np.interp(times, knots, values), least, most)
+    return np.asarray(np.maximum.accumulate(moved))
+
+
+def _band(rows: int, columns: int, settings: SpliceSettings, pins: Sequence[Pin]) -> Band:
+    width = max(settings.band[0] * rows, settings.least_band * settings.fps)
+    return pinned_band(anchors_of(pins, rows, columns, settings.fps), width)
+
+
+def _aligned_hands(
+    body: Clip,
+    hand_clip: Clip,
+    body_hands: Hands,
+    hand_hands: Hands,
+    settings: SpliceSettings,
+    pins: Mapping[Side, tuple[Pin, ...]],
+) -> tuple[dict[Side, Alignment], list[str]]:
+    """Alignments of the hands that move; hands that do not follow the other one."""
+    times = np.arange(len(body)) / body.fps
+    found: dict[Side, Alignment] = {}
+    still: list[Side] = []
+    for side, own in pins.items():
+        ours = hand_markers(body, body_hands, side, settings.fps)
+        theirs = hand_markers(hand_clip, hand_hands, side, settings.fps)
+        if any(is_still(m, settings.smoothing) for m in (ours, theirs)):
+            still.append(side)
+        else:
+            found[side] = _aligned(ours, theirs, settings, own, times)
+    if not found:
+        raise InputError(
+            f"No hand moves in both {body.name} and {hand_clip.name}, so nothing tells which "
+            "moments belong together."
+        )
+    notes = []
+    for side in still:
+        [(moving, alignment)] = found.items()
+        found[side] = _following(alignment, moving, pins[side], times)
+        notes.append(f"the {side} hand does not move: it follows the {moving} one")
+    return {side: found[side] for side in pins}, notes
+
+
+def _aligned(
+    ours: Markers, theirs: Markers, settings: SpliceSettings, pins: tuple[Pin, ...], times: Array
+) -> Alignment:
+    if settings.align == "trunk" and any(m.facing is None for m in (ours, theirs)):
+        raise UsageError("A clip has no trunk to align by: use --align local.")
+    second, first, cost = align(ours, theirs, settings, pins, times)
+    warp = np.interp(np.arange(len(ours)) / ours.fps, times, second)
+    return Alignment(
+        np.stack([times, second], axis=1),
+        first,
+        pins,
+        cost / len(ours),
+        phase_qualities(ours, theirs, warp, settings.smoothing),
+        (ours.origin, theirs.origin),
+    )
+
+
+def is_still(markers: Markers, smoothing: float) -> bool:
+    """Whether a wrist stays where it is."""
+    wrist = smoothed(markers.wrist, smoothing * markers.fps)
+    return bool(np.linalg.norm(wrist - wrist.mean(axis=0), axis=-1).max() < STILL_CM)
+
+
+def _following(alignment: Alignment, side: Side, pins: tuple[Pin, ...], times: Array) -> Alignment:
+    warp = through_pins(alignment.warp[:, 1], times, pins)
+    return replace(
+        alignment, warp=np.stack([times, warp], axis=1), pins=pins, phases=(), taken_from=side
+    )
+
+
+def _checked_lengths(
+    body: Clip, hand_clip: Clip, settings: SpliceSettings, pinned: bool
+) -> Sequence[str]:
+    """Notes on the clips' lengths; UsageError where they cannot be of one performance."""
+    for name, clip in (("body", body), ("hand", hand_clip)):
+        if len(clip) < 3:
+            raise InputError(f"The {name} clip {clip.name} has only {len(clip)} frames.")
+    longer, shorter = max(body.duration, hand_clip.duration), min(body.duration, hand_clip.duration)
+    lengths = f"The body lasts {body.duration:.2f} s, the hand clip {hand_clip.duration:.2f} s"
+    cells = settings.band[0] * body.duration * hand_clip.duration * settings.fps**2
+    if cells > MOST_CELLS:
+        raise UsageError(f"{lengths}: too long to align at once. Give a narrower --band.")
+    if longer > shorter / settings.band[0] and not pinned:
+        raise UsageError(
+            f"{lengths}, which is beyond the band of {settings.band[0]:g}. Are they of the same "
+            "performance? Then pin moments that belong together (--pin), or widen the --band."
+        )
+    if longer > UNLIKELY_FACTOR * shorter:
+        return [f"{lengths}: more than a factor of {UNLIKELY_FACTOR:g} apart"]
+    return []

@@ -1,0 +1,209 @@
+"""Pass 1: phases of the motion matched by the signs of its derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usdhand.motion.rotations import Array
+from usdhand.splice.band import Band
+from usdhand.splice.markers import Markers
+
+Align = Literal["local", "trunk"]
+Directions = Literal["spread", "axes"]
+
+WINDOW = 5  # frames of the window that a turn about the vertical is fitted to
+TURNS = 32
+WAITING = 3  # rows at an end that share a column, beyond which the hand clip is not only slow there
+STEADY_S = 2.0  # standard deviation of the time over which performers keep their direction
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """What pass 1 matched: columns ``first`` to ``last`` (rows,) of every row, and their cost."""
+
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    cost: int
+
+    @property
+    def middle(self) -> Array:
+        """(rows,) middle of the columns of each row."""
+        return np.asarray((self.first + self.last) / 2.0)
+
+    @property
+    def open_ended(self) -> Array:
+        """(rows,) the middle, but as if either clip went on where the other one begins or ends.
+
+        Frames of the hand clip before the body's first have no partner, and where the hand clip
+        has not begun it is to come at its usual speed: so smoothing finds no bend at the ends.
+        """
+        warp, rows = self.middle, np.arange(len(self.first))
+        warp[0], warp[-1] = self.last[0], self.first[-1]
+        begun = int(np.argmax(self.last > self.first[0]))
+        done = len(warp) - 1 - int(np.argmax(self.first[::-1] < self.last[-1]))
+        if WAITING < begun <= done:
+            warp[:begun] = warp[begun] - (begun - rows[:begun])
+        if begun <= done < len(warp) - 1 - WAITING:
+            warp[done + 1 :] = warp[done] + (rows[done + 1 :] - done)
+        return warp
+
+
+def phase_path(
+    body: Markers,
+    hand: Markers,
+    band: Band,
+    smoothing: float,
+    dead_zone: float,
+    align: Align = "local",
+    directions: Directions = "spread",
+) -> Path:
+    """Least-cost path through a band under the sign cost, both hands at the same rate.
+
+    Parameters
+    ----------
+    smoothing : standard deviation of the Gaussian whose derivatives are taken, seconds
+    dead_zone : derivatives below this share of their RMS have the sign 0
+    """
+    from usdhand.alignment import phase_dtw
+
+    turns = phase_dtw.turn_angles(TURNS) if align == "local" else np.zeros(1)
+    if align == "trunk":
+        body, hand = (facing_forward(m) for m in (body, hand))
+    ours = derivative_signs(body, smoothing, dead_zone, np.zeros(1), directions)
+    theirs = derivative_signs(hand, smoothing, dead_zone, turns, directions)
+    windows = [_windows(m, smoothing, phase_dtw.BLOCK) for m in (body, hand)]
+    centred = windows[0] - windows[0].mean(axis=2, keepdims=True)
+    first, last, cost = phase_dtw.phase_path(
+        ours[0],
+        theirs,
+        np.ascontiguousarray(centred, np.float32),
+        np.ascontiguousarray(windows[1].transpose(1, 2, 0), np.float32),
+        band.low,
+        band.high,
+    )
+    return Path(first, last, int(cost))
+
+
+def steadied(
+    body: Markers,
+    hand: Markers,
+    path: Path,
+    band: Band,
+    smoothing: float,
+    dead_zone: float,
+    directions: Directions = "spread",
+) -> Path:
+    """The least-cost path near another one, with turns that change as slowly as performers do.
+
+    A turn that is fitted to five frames of small markers is as noisy as they are. Along a path,
+    all frames within `STEADY_S` can tell it.
+
+    Parameters
+    ----------
+    band : of the new path; the old one must be within
+    """
+    from usdhand.alignment import phase_dtw
+
+    turned = facing(body, -steady_turns(body, hand, path.middle))
+    ours = derivative_signs(turned, smoothing, dead_zone, np.zeros(1), directions)
+    theirs = derivative_signs(hand, smoothing, dead_zone, np.zeros(1), directions)
+    nothing = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
+    first, last, cost = phase_dtw.phase_path(ours[0], theirs, *nothing, band.low, band.high)
+    return Path(first, last, int(cost))
+
+
+def steady_turns(body: Markers, hand: Markers, path: Array) -> Array:
+    """(rows,) radians by which the hand clip turns onto the body along a path, equation (7)."""
+    level = [m.positions[..., [0, 2]] for m in (body, hand)]
+    p, q = (v - v.mean(axis=1, keepdims=True) for v in level)
+    q = q[np.clip(np.rint(path), 0, len(q) - 1).astype(np.intp)]
+    cosine = np.sum(p * q, axis=(1, 2))
+    sine = np.sum(p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0], axis=1)
+    both = smoothed(np.stack([cosine, sine], axis=1), STEADY_S * body.fps)
+    return np.asarray(np.arctan2(both[:, 1], both[:, 0]))
+
+
+def smoothed(curve: Array, deviation: float, order: int = 0) -> Array:
+    """Gaussian smoothing (or its derivative) along axis 0, the deviation in frames."""
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(curve, deviation, axis=0, order=order, mode="nearest"))
+
+
+def derivative_signs(
+    markers: Markers,
+    smoothing: float,
+    dead_zone: float,
+    turns: Array,
+    directions: Directions = "spread",
+) -> NDArray[np.uint64]:
+    """Signs of velocity and acceleration after turns about the vertical, as bits.
+
+    Returns
+    -------
+    (turns, 2, frames) words: bits of the signs that are positive, and of those that are negative
+    """
+    from usdhand.alignment.phase_dtw import signs_along
+
+    result = np.zeros((len(turns), 2, len(markers)), np.uint64)
+    axes = sign_axes(directions)
+    along = np.stack([_about_vertical(axes, -turn) for turn in turns]).astype(np.float32)
+    for order in (1, 2):
+        derivative = smoothed(markers.positions, smoothing * markers.fps, order)
+        limit = dead_zone * np.sqrt(np.mean(np.sum(derivative**2, axis=-1)))
+        by_frame = np.ascontiguousarray(np.moveaxis(derivative, 0, 2), np.float32)
+        signs_along(by_frame, along, float(limit), result)
+    return result
+
+
+def sign_axes(directions: Directions) -> Array:
+    """(markers, axes, 3) unit directions along which the signs of a marker are taken.
+
+    ``axes`` are the paper's x, y and z. With ``spread`` every marker has eight directions, turned
+    by another angle about the vertical: markers of a hand mostly move alike, so that their signs
+    along the same axes change together and say less about when. Still nothing but signs.
+    """
+    if directions == "axes":
+        return np.tile(np.eye(3), (4, 1, 1))
+    half = np.sqrt(0.5)
+    axes = np.array(
+        [
+            *np.eye(3),
+            [half, 0, half],
+            [half, half, 0],
+            [half, -half, 0],
+            [0, half, half],
+            [0, -half, half],
+        ]
+    )
+    return np.stack([_about_vertical(axes, np.radians(a)) for a in (0.0, 45.0, 22.5, 67.5)])
+
+
+def facing_forward(markers: Markers) -> Markers:
+    """Markers in axes that turn with the trunk."""
+    assert markers.facing is not None
+    return facing(markers, np.arctan2(markers.facing[:, 1], markers.facing[:, 0]))
+
+
+def facing(markers: Markers, angles: Array) -> Markers:
+    """Markers turned about the vertical by ``angles`` (frames,) in radians."""
+    return replace(markers, positions=_about_vertical(markers.positions, angles[:, None]))
+
+
+def _about_vertical(v: Array, angle: Array | float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    return np.stack([c * x + s * z, y, c * z - s * x], axis=-1)
+
+
+def _windows(markers: Markers, smoothing: float, block: int) -> Array:
+    """(blocks, 2, 20) level coordinates of the markers in five frames about each block's middle."""
+    positions = smoothed(markers.positions, smoothing * markers.fps)
+    middles = np.arange(0, len(markers), block) + block // 2
+    frames = np.clip(middles[:, None] + np.arange(WINDOW) - WINDOW // 2, 0, len(markers) - 1)
+    level = positions[frames][..., [0, 2]]  # blocks, window, markers, 2
+    return np.moveaxis(level.reshape(len(middles), -1, 2), 1, 2)
