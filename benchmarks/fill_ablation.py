@@ -28,8 +28,8 @@ VARIANTS: tuple[tuple[str, FillSettings], ...] = (
     ("... chordal instead of Euler", replace(PAPER, metric="chordal")),
     ("... and from shoulder and elbow, with the wrist's bend", replace(PAPER, metric="arm")),
     ("... and costs scaled to the same average", replace(PAPER, metric="arm", scaled=True)),
-    ("... and short segments", replace(DEFAULT, pool=0, blend="linear")),
-    ("... and smooth seams", replace(DEFAULT, pool=0)),
+    ("... and short segments", replace(DEFAULT, pool=0, blend="linear", repeat_weight=0.0)),
+    ("... and smooth seams, no piece twice", replace(DEFAULT, pool=0)),
     ("... and neighbours' say: **the default**", DEFAULT),
     ("default, segments as the paper's", replace(DEFAULT, segmentation=PAPER_SEGMENTATION)),
     ("default, Euler metric", replace(DEFAULT, metric="euler")),
@@ -37,6 +37,7 @@ VARIANTS: tuple[tuple[str, FillSettings], ...] = (
     ("default, k = 10", replace(DEFAULT, k=10)),
     ("default, no transition costs", replace(DEFAULT, transition_weight=0.0)),
     ("default, transition costs doubled", replace(DEFAULT, transition_weight=1.0)),
+    ("default, pieces may repeat at once", replace(DEFAULT, repeat_weight=0.0)),
     ("default, both hands as one (`--couple`)", replace(DEFAULT, couple=True)),
 )
 

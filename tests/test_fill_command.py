@@ -213,7 +213,9 @@ def test_a_segment_without_candidates_does_not_fail_the_body(
     text = run("fill", BODY, "--library", tmp_path / "long.usdc", "-o", out).output
     assert "no segment of like length" in text
     data = json.loads(
-        run("fill", BODY, "--library", tmp_path / "long.usdc", "-o", out, "-n", "--json").stdout
+        run(
+            "fill", BODY, "--library", tmp_path / "long.usdc", "-o", out, "--force", "--json"
+        ).stdout
     )
     assert max(s["stretched"] for s in data["hands"]["left"]["segments"]) > 1
 

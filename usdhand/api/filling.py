@@ -244,7 +244,8 @@ def write_filled(
     sides = [side for part in filled.parts for side in part.part]
     hands = find_hands(best, conventions, sides)
     changed = [int(j) for frames in hands.frames.values() for j in frames.joints]
-    variants = {f"choice_{i}": clip for i, clip in enumerate(filled.clips, 1)}
+    digits = len(str(len(filled.clips)))  # so that editors sort them
+    variants = {f"choice_{i:0{digits}}": clip for i, clip in enumerate(filled.clips, 1)}
     write_motion(
         character,
         best,
@@ -337,6 +338,8 @@ def _read(task: _Task) -> LibraryClip | Left:
             label=task.label,
             actor=task.actor,
         )
+        if not made.hands:
+            return Left(task.relative, "its fingers do not move")
         return replace(made, name=task.name)
     except UsdHandError as error:
         return Left(task.relative, str(error))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from usdhand.cli.common import (
+    check_report,
     find_files,
     force_option,
     json_option,
@@ -86,6 +87,7 @@ def command(
     settings = replace(PAPER if preset == "paper" else FillSettings(), k=k)
     if metric:
         settings = replace(settings, metric=metric)
+    check_report(report, force)
     motions = filling.read_library(library)
     paths = find_files(takes) if takes else []
     agreements = []

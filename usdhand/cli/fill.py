@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from usdhand.cli.common import (
+    check_report,
     dry_run_option,
     flatten_option,
     force_option,
@@ -116,8 +117,8 @@ def command(
         couple=couple,
         **{name: value for name, value in given.items() if value is not None},
     )
-    if not dry_run:
-        check_output(output, [body, library], force, USD_SUFFIXES)
+    check_output(output, [body, library], force, USD_SUFFIXES)
+    check_report(report, force)
     conventions = api.conventions_from(maps)
     motions = filling.read_library(library)
     clip = api.read_clip(body, skel)

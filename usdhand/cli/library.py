@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from usdhand.cli.common import (
+    check_report,
     files_argument,
     find_files,
     force_option,
@@ -91,6 +92,7 @@ def build(
 
     paths = [p for p in find_files(clips) if not _same(p, output)]
     check_output(output, paths, True, OUTPUTS)
+    check_report(report, force)
     if output.exists() and not filling.is_library(output):
         raise OutputError(f"{output} exists and is no motion library; give another name.")
     previous = filling.read_library(output) if output.exists() and not rebuild else None

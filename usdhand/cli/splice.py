@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from usdhand.cli.common import (
+    check_report,
     dry_run_option,
     flatten_option,
     force_option,
@@ -115,8 +116,8 @@ def command(
     from usdhand.splice import SpliceSettings
 
     settings = SpliceSettings(band=_widths(band), align=align, wrist=wrist)  # type: ignore[arg-type]
-    if not dry_run:
-        check_output(output, [body, hands], force, USD_SUFFIXES)
+    check_output(output, [body, hands], force, USD_SUFFIXES)
+    check_report(report, force)
     conventions = api.conventions_from(maps)
     clip, hand_clip = api.read_clip(body, skel), api.read_clip(hands, hands_skel)
     warn_of(clip, quiet)

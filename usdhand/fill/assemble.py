@@ -16,6 +16,10 @@ Blend = Literal["smooth", "linear"]
 BLEND_MEAN_DEG = 5.0
 BLEND_MAX_DEG = 20.0
 
+# Standard deviations, in seconds: of the smoothing at seams, and of how far it reaches.
+SEAM_SMOOTHING_S = 0.033
+SEAM_WINDOW_S = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -54,6 +58,24 @@ def join(pieces: Sequence[Piece], blend: Blend = "smooth") -> Array:
         result[piece.first : piece.last + 1] = curves
         velocity = _velocity(curves, -1)
     return result
+
+
+def soften_seams(curves: Array, seams: Sequence[int], fps: float) -> Array:
+    """Curves (frames, channels) smoothed around the seams only, so that they bend no faster there.
+
+    Joined pieces agree in angle and speed but not in acceleration; captured motion has no such
+    corners. Away from the seams nothing changes.
+    """
+    from scipy.ndimage import distance_transform_edt, gaussian_filter1d
+
+    if not len(seams):
+        return curves
+    elsewhere = np.ones(len(curves), dtype=bool)
+    elsewhere[list(seams)] = False
+    smooth = gaussian_filter1d(curves, SEAM_SMOOTHING_S * fps, axis=0, mode="nearest")
+    apart = distance_transform_edt(elsewhere) / fps
+    weight = np.exp(-0.5 * (apart / SEAM_WINDOW_S) ** 2)[:, None]
+    return np.asarray(curves + weight * (smooth - curves))
 
 
 def limited(curves: Array, low: Array, high: Array) -> Array:

@@ -61,7 +61,23 @@ def graph(
         )
         for a, b in pairwise(open_ends)
     )
-    return Graph(layers, edges)
+    usual = float(np.mean([edge.mean() for edge in edges])) if edges else 0.0
+    repeated = (
+        _same_segment(before, after, a, b)
+        for (before, after), (a, b) in zip(pairwise(found), pairwise(layers), strict=True)
+    )
+    loops = settings.repeat_weight * usual
+    return Graph(layers, tuple(e + loops * r for e, r in zip(edges, repeated, strict=True)))
+
+
+def _same_segment(
+    before: Sequence[Candidate], after: Sequence[Candidate], a: Layer, b: Layer
+) -> Array:
+    """One where two candidates are the same piece of the library: played twice, it would loop."""
+    first = np.array([before[i].segment for i in a.order])
+    second = np.array([after[i].segment for i in b.order])
+    same: Array = (first[:, None] == second[None]).astype(np.float64)
+    return same
 
 
 def choose(graph: Graph, settings: FillSettings) -> list[Path]:

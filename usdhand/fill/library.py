@@ -17,6 +17,8 @@ from usdhand.motion.rotations import Array
 
 # Arms are searched at this rate; fingers keep that of their clip.
 ARM_FPS = 30.0
+# Fingers that move less than this, in every channel, are still.
+STILL_DEG = 2.0
 
 # Parts of a body that are filled on their own, or both hands as one.
 Part = tuple[Side, ...]
@@ -97,17 +99,25 @@ class MotionLibrary:
         return sum(c.duration for c in self.clips) / 60.0
 
 
+def fingers_moving(curves: Array) -> bool:
+    """Whether finger channels (frames, channels) in degrees have motion of their own."""
+    return bool(np.ptp(curves, axis=0).max(initial=0.0) > STILL_DEG)
+
+
 def library_hands(clip: Clip, hands: Hands, segmentation: Segmentation) -> dict[Side, LibraryHand]:
-    """What a library keeps of a clip's hands."""
+    """What a library keeps of a clip's hands: those whose fingers move."""
     found: dict[Side, LibraryHand] = {}
     channels = hands.encode(clip)
     for side, frames in hands.frames.items():
+        curves = channels.select(all_channels(side, frames.names)).values
+        if not fingers_moving(curves):
+            continue
         arm = at_arm_rate(arm_motion(clip, hands, side), clip.fps)
         speed = wrist_speed(arm.hips_position, ARM_FPS, segmentation.smoothing)
         found[side] = LibraryHand(
             arm,
             frames.names,
-            channels.select(all_channels(side, frames.names)).values,
+            curves,
             tuple(segments(speed, ARM_FPS, segmentation)),
         )
     return found

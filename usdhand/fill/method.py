@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import PurePosixPath
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from usdhand.anatomy import SIDES, Channels, Hands, Side
 from usdhand.anatomy.channels import all_channels
 from usdhand.errors import InputError, UsageError
 from usdhand.fill.arm import arm_motion
-from usdhand.fill.assemble import Piece, join, limited
+from usdhand.fill.assemble import Piece, join, limited, soften_seams
 from usdhand.fill.candidates import (
     Candidate,
     SearchSpace,
@@ -25,17 +24,16 @@ from usdhand.fill.candidates import (
     search_space,
 )
 from usdhand.fill.choose import Graph, choose, graph
-from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate
+from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate, fingers_moving
 from usdhand.fill.limits import channel_limits
 from usdhand.fill.metric import metric
 from usdhand.fill.path import Path
 from usdhand.fill.results import Alternative, Choice, Filled, FilledPart
+from usdhand.fill.same import same_motion
 from usdhand.fill.segment import Segmentation
 from usdhand.fill.settings import FillSettings
 from usdhand.motion import Clip
 
-# Fingers that move less than this, in every channel, are still: there is nothing to lose.
-STILL_DEG = 2.0
 # A segment of the body has at least so many frames: speeds and seams need some.
 FEWEST_FRAMES = 3
 
@@ -72,7 +70,7 @@ def fill(
     if len(body) < 2:
         raise InputError(f"{body.name} is a single frame; there is no motion to find fingers for.")
     channels = hands.encode(body)
-    own = _own_clips(library, body.name, content_hash)
+    own = same_motion(library, body, hands, content_hash)
     moving = tuple(s for s in sides if s in hands.frames and _moves(channels, hands, s))
     kept = () if replace_motion else moving
     open_sides: Part = tuple(s for s in sides if s in hands.frames and s not in kept)
@@ -131,17 +129,7 @@ def fingers_move(clip: Clip, hands: Hands, side: Side) -> bool:
 
 
 def _moves(channels: Channels, hands: Hands, side: Side) -> bool:
-    curves = channels.select(all_channels(side, hands.frames[side].names)).values
-    return bool(np.ptp(curves, axis=0).max() > STILL_DEG)
-
-
-def _own_clips(library: MotionLibrary, name: str, content_hash: str | None) -> list[int]:
-    """Library clips that are the very motion that is filled: by content, or by name."""
-    return [
-        i
-        for i, clip in enumerate(library.clips)
-        if clip.content_hash == content_hash or name in (clip.name, PurePosixPath(clip.path).stem)
-    ]
+    return fingers_moving(channels.select(all_channels(side, hands.frames[side].names)).values)
 
 
 def _usable_clips(
@@ -212,10 +200,13 @@ def _fill_part(
                 borders, curves, network.layers, path.nodes, strict=True
             )
         ]
-        joined = limited(join(pieces, settings.blend), low, high)
-        choices = _choices(path, network, found, cut)
+        joined = join(pieces, settings.blend)
         seams = tuple(piece.first for piece in pieces[1:])
-        alternatives.append(Alternative(names, joined, choices, path.cost, seams))
+        if settings.blend == "smooth":
+            joined = soften_seams(joined, seams, body.fps)
+        choices = _choices(path, network, found, cut)
+        fingers = limited(joined, low, high)
+        alternatives.append(Alternative(names, fingers, choices, path.cost, seams))
     return FilledPart(part, space, tuple(alternatives))
 
 

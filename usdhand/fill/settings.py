@@ -24,6 +24,7 @@ class FillSettings:
     sharpness : how fast a neighbour's say fades with its cost
     segment_weight, transition_weight : of both costs on the path
     scaled : bring both costs to the same average first, as the paper wants them
+    repeat_weight : of playing one piece of the library twice in a row, in usual transition costs
     angle_weight, velocity_weight : of the transition cost
     alternatives : how many results
     couple : take both hands from the same clip
@@ -38,6 +39,7 @@ class FillSettings:
     segment_weight: float = 1.0
     transition_weight: float = 0.5
     scaled: bool = True
+    repeat_weight: float = 1.0
     angle_weight: float = 1.0
     velocity_weight: float = 0.5
     blend: Blend = "smooth"
@@ -54,5 +56,10 @@ class FillSettings:
 
 
 PAPER = FillSettings(
-    metric="euler", pool=0, scaled=False, blend="linear", segmentation=PAPER_SEGMENTATION
+    metric="euler",
+    pool=0,
+    repeat_weight=0.0,
+    scaled=False,
+    blend="linear",
+    segmentation=PAPER_SEGMENTATION,
 )

@@ -104,7 +104,9 @@ def read_library(path: str | Path) -> MotionLibrary:
     version = root.GetAttribute("usdhand:libraryVersion").Get() if root else None
     if version != VERSION:
         found = "no motion library" if version is None else f"a library of version {version}"
-        raise InputError(f"{path} is {found}; 'usdhand library build --rebuild' makes one.")
+        raise InputError(
+            f"{path} is {found}; 'usdhand library build CLIP... -o LIBRARY' makes one."
+        )
 
     def setting(name: str, default: float) -> float:
         value = root.GetAttribute(f"usdhand:segmentation:{name}").Get()

@@ -1,0 +1,83 @@
+"""A fill never copies the answer, and never takes fingers that do not move."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from cli_runner import run
+from conftest import REPOSITORY
+
+SAMPLES = REPOSITORY / "samples"
+TALKS = SAMPLES / "conversations"
+
+
+def flattened(source: Path, target: Path) -> Path:
+    from pxr import Usd
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    Usd.Stage.Open(str(source)).Flatten().Export(str(target))
+    return target
+
+
+def test_the_same_performance_under_another_name_is_left_out(tmp_path: Path) -> None:
+    for name in ("ok_01", "wipe_01", "turn_01", "big_02"):
+        flattened(SAMPLES / "gestures" / f"{name}.usdc", tmp_path / "clips" / f"{name}.usdc")
+    flattened(TALKS / "talk_01_full.usdc", tmp_path / "clips" / "renamed.usdc")
+    library, out = tmp_path / "l.usdc", tmp_path / "o.usda"
+    run("library", "build", tmp_path / "clips", "-o", library, "-q")
+    body = TALKS / "talk_01_body.usdc"
+    report = json.loads(run("fill", body, "--library", library, "-o", out, "--json").stdout)
+    assert report["left_out"] == ["renamed"]
+
+
+def test_equal_names_of_other_motion_are_used(tmp_path: Path) -> None:
+    for shot, name in (("s0", "ok_01"), ("s1", "wipe_01"), ("s2", "turn_01")):
+        flattened(SAMPLES / "gestures" / f"{name}.usdc", tmp_path / shot / "anim.usdc")
+    body = flattened(TALKS / "talk_01_body.usdc", tmp_path / "new" / "anim.usdc")
+    library, out = tmp_path / "l.usdc", tmp_path / "o.usda"
+    clips = [tmp_path / s / "anim.usdc" for s in ("s0", "s1", "s2")]
+    run("library", "build", *clips, "-o", library, "-q")
+    report = json.loads(run("fill", body, "--library", library, "-o", out, "--json").stdout)
+    assert report["left_out"] == []
+    assert report["hands"]["right"]["segments"]
+
+
+def test_no_piece_is_played_twice_in_a_row(tmp_path: Path) -> None:
+    library, out = tmp_path / "l.usdc", tmp_path / "o.usda"
+    run("library", "build", SAMPLES / "gestures", "-o", library, "-q")
+    body = TALKS / "talk_01_body.usdc"
+    report = json.loads(run("fill", body, "--library", library, "-o", out, "--json").stdout)
+    for hand in report["hands"].values():
+        pieces = [(s["clip"], s["clip_start"]) for s in hand["segments"]]
+        assert sum(a == b for a, b in pairwise(pieces)) <= len(pieces) // 20
+        seams = hand["seams"]
+        captured = seams["max_acceleration_captured_deg_s2"]
+        assert seams["max_acceleration_deg_s2"] < 1.2 * captured
+
+
+def test_still_fingers_are_no_library(tmp_path: Path) -> None:
+    library = tmp_path / "l.usdc"
+    built = json.loads(run("library", "build", TALKS, "-o", library, "--json").stdout)
+    left = {Path(x["path"]).stem: x["reason"] for x in built["left_out"]}
+    assert set(left) == {f"talk_0{i}_body" for i in (1, 2, 3)}
+    assert all("do not move" in reason for reason in left.values())
+
+
+@pytest.mark.parametrize("verb", ["fill", "library"])
+def test_a_refused_report_leaves_no_output(tmp_path: Path, verb: str) -> None:
+    library = tmp_path / "l.usdc"
+    clips = [SAMPLES / "gestures" / f"ok_0{i}.usdc" for i in (1, 2)]
+    bad = ("--report", tmp_path / "none" / "r.json")
+    if verb == "library":
+        run("library", "build", *clips, "-o", library, *bad, code=2)
+        assert list(tmp_path.iterdir()) == []
+        return
+    run("library", "build", *clips, "-o", library, "-q")
+    body = TALKS / "talk_01_body.usdc"
+    run("fill", body, "--library", library, "-o", tmp_path / "o.usda", *bad, code=2)
+    assert [p.name for p in tmp_path.iterdir()] == ["l.usdc"]
+    shutil.rmtree(tmp_path)

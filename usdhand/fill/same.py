@@ -1,0 +1,59 @@
+"""Library clips that are the very performance that is filled, under whatever name or on any rig."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from usdhand.anatomy import Hands
+from usdhand.fill.arm import arm_motion
+from usdhand.fill.library import ARM_FPS, MotionLibrary, at_arm_rate
+from usdhand.motion import Clip
+from usdhand.motion.rotations import Array
+
+# Two takes are one performance if the wrists' paths are this alike, but for a small offset.
+SAME_CM = 0.5
+LONGEST_OFFSET_S = 0.5
+# What lies still tells nothing of being the same.
+SMALLEST_PATH_CM = 5.0
+
+
+def same_motion(
+    library: MotionLibrary, body: Clip, hands: Hands, content_hash: str | None
+) -> list[int]:
+    """Clips with the same content, or with the same arm motion as the body.
+
+    Taking fingers from them would be copying the answer, which is what nobody wants to measure.
+    """
+    paths = {
+        side: at_arm_rate(arm_motion(body, hands, side), body.fps).hips_position
+        for side in hands.frames
+    }
+    return [
+        i
+        for i, clip in enumerate(library.clips)
+        if (content_hash is not None and clip.content_hash == content_hash)
+        or _same_paths(
+            [(paths[s], h.arm.hips_position) for s, h in clip.hands.items() if s in paths]
+        )
+    ]
+
+
+def _same_paths(pairs: list[tuple[Array, Array]]) -> bool:
+    """Whether all pairs of paths (frames, 3) are alike at one offset, and some of them moves."""
+    if not pairs or max(np.ptp(a, axis=0).max() for a, _ in pairs) < SMALLEST_PATH_CM:
+        return False
+    most = int(LONGEST_OFFSET_S * ARM_FPS)
+    if any(abs(len(a) - len(b)) > most for a, b in pairs):
+        return False
+
+    def apart(offset: int) -> float:
+        distances = []
+        for a, b in pairs:
+            count = min(len(a) - max(-offset, 0), len(b) - max(offset, 0))
+            if count < 2:
+                return np.inf
+            first, second = a[max(-offset, 0) :][:count], b[max(offset, 0) :][:count]
+            distances.append(float(np.sqrt(np.mean((first - second) ** 2))))
+        return max(distances)
+
+    return any(apart(offset) < SAME_CM for offset in range(-most, most + 1))
