@@ -81,3 +81,21 @@ def test_a_refused_report_leaves_no_output(tmp_path: Path, verb: str) -> None:
     run("fill", body, "--library", library, "-o", tmp_path / "o.usda", *bad, code=2)
     assert [p.name for p in tmp_path.iterdir()] == ["l.usdc"]
     shutil.rmtree(tmp_path)
+
+
+def test_a_body_without_finger_joints_is_told_so(tmp_path: Path) -> None:
+    from pxr import Usd, Vt
+
+    stage = Usd.Stage.Open(Usd.Stage.Open(str(TALKS / "talk_01_body.usdc")).Flatten())
+    skeleton = stage.GetPrimAtPath("/Ada/Skeleton")
+    joints = list(skeleton.GetAttribute("joints").Get())
+    keep = [i for i, j in enumerate(joints) if "Hand/" not in j]
+    for name in ("bindTransforms", "restTransforms"):
+        values = skeleton.GetAttribute(name).Get()
+        skeleton.GetAttribute(name).Set(Vt.Matrix4dArray([values[i] for i in keep]))
+    skeleton.GetAttribute("joints").Set(Vt.TokenArray([joints[i] for i in keep]))
+    body, library = tmp_path / "body.usdc", tmp_path / "l.usdc"
+    stage.GetRootLayer().Export(str(body))
+    run("library", "build", SAMPLES / "gestures" / "ok_01.usdc", "-o", library, "-q")
+    result = run("fill", body, "--library", library, "-o", tmp_path / "o.usda", code=4)
+    assert "no finger joints" in result.output

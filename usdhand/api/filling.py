@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 
 from usdhand.anatomy import SIDES, Conventions, Side, load_conventions
 from usdhand.api.clips import find_hands, source_file
-from usdhand.errors import InputError, UsageError, UsdHandError
+from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
 from usdhand.fill import (
     Filled,
     FillSettings,
@@ -213,7 +213,15 @@ def fill_fingers(
     conventions: Conventions | None = None,
 ) -> Filled:
     """Give a body clip the fingers of similar motions; see `usdhand.fill.fill`."""
-    hands = find_hands(body, conventions, sides)
+    try:
+        hands = find_hands(body, conventions, sides)
+    except HandNotFoundError as error:
+        if _names_fingers(body):
+            raise
+        raise HandNotFoundError(
+            f"{body.origin.path or body.name}: the skeleton has no finger joints, so there is "
+            "nothing to put finger motion on. Bind the body's motion to a character that has them."
+        ) from error
     content = file_hash(body.origin.path) if body.origin.path else None
     return fill(
         body,
@@ -224,6 +232,12 @@ def fill_fingers(
         replace_motion=replace_motion,
         content_hash=content,
     )
+
+
+def _names_fingers(clip: Clip) -> bool:
+    """Whether any joint is named like a finger."""
+    words = ("thumb", "index", "finger", "middle", "ring", "pinky", "little")
+    return any(word in name.lower() for name in clip.skeleton.names for word in words)
 
 
 def write_filled(
