@@ -17,6 +17,7 @@ from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
 REFERENCE_HEIGHT_CM = 170.0
+HEAD_TO_HEIGHT = 0.93  # lowest joint to the head joint, which lies at the top of the neck
 ARM_TO_HEIGHT = 0.332  # shoulder to wrist
 FOREARM_TO_ARM = 0.44
 
@@ -52,12 +53,16 @@ class ArmMotion:
 def body_height(skeleton: Skeleton, hands: Hands) -> float:
     """Height of a character at its bind pose, cm.
 
-    From the lowest to the highest joint; for what is no whole body, from the length of an arm
+    From the lowest joint to the head's; for what is no whole body, from the length of an arm
     (Winter, Biomechanics and Motor Control of Human Movement, 2009, figure 4.1).
     """
     character = hands.character
     if character.head is not None and character.hips is not None:
-        return float(np.ptp(skeleton.bind_positions[:, 1]))
+        hips = character.hips
+        body = [j for j in range(len(skeleton)) if j == hips or hips in skeleton.ancestors(j)]
+        heights = skeleton.bind_positions[:, 1]
+        # Not to the highest joint: some rigs have eyes, hair or an end above the head joint.
+        return float(heights[character.head] - heights[body].min()) / HEAD_TO_HEIGHT
     lengths = [_arm_length(skeleton, h) for h in character.hands.values()]
     return max(lengths) / ARM_TO_HEIGHT if max(lengths) > 0 else REFERENCE_HEIGHT_CM
 

@@ -11,8 +11,9 @@ from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 
 # Two takes are one performance if the wrists' paths are this alike, but for a small offset.
-SAME_CM = 0.5
-LONGEST_OFFSET_S = 0.5
+SAME_CM = 1.0
+LONGEST_OFFSET_S = 1.0
+SMALLEST_OVERLAP = 0.7
 # What lies still tells nothing of being the same.
 SMALLEST_PATH_CM = 5.0
 
@@ -43,14 +44,14 @@ def _same_paths(pairs: list[tuple[Array, Array]]) -> bool:
     if not pairs or max(np.ptp(a, axis=0).max() for a, _ in pairs) < SMALLEST_PATH_CM:
         return False
     most = int(LONGEST_OFFSET_S * ARM_FPS)
-    if any(abs(len(a) - len(b)) > most for a, b in pairs):
+    if any(min(len(a), len(b)) < SMALLEST_OVERLAP * max(len(a), len(b)) for a, b in pairs):
         return False
 
     def apart(offset: int) -> float:
         distances = []
         for a, b in pairs:
             count = min(len(a) - max(-offset, 0), len(b) - max(offset, 0))
-            if count < 2:
+            if count < SMALLEST_OVERLAP * min(len(a), len(b)):
                 return np.inf
             first, second = a[max(-offset, 0) :][:count], b[max(offset, 0) :][:count]
             distances.append(float(np.sqrt(np.mean((first - second) ** 2))))
