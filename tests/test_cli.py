@@ -9,13 +9,13 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cli_runner
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from cli_runner import edit
+from click.testing import Result
 from conftest import REPOSITORY
 from pxr import Sdf, Usd, UsdSkel, Vt
-
-from usdhand.cli import main
 
 SAMPLES = REPOSITORY / "samples"
 OK = SAMPLES / "gestures" / "ok_01.usdc"
@@ -25,16 +25,7 @@ Run = Callable[..., Result]
 
 @pytest.fixture
 def run() -> Run:
-    def call(*arguments: object, code: int = 0) -> Result:
-        result = CliRunner().invoke(main, [str(a) for a in arguments])
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        assert result.exit_code == code, result.output
-        if code:
-            assert "Traceback" not in result.output
-        return result
-
-    return call
+    return cli_runner.run
 
 
 @pytest.fixture
@@ -42,15 +33,6 @@ def rig(run: Run, tmp_path: Path) -> Path:
     path = tmp_path / "ok_rig.usda"
     run("reduce", OK, "-o", path)
     return path
-
-
-def edit(source: Path, target: Path, change: Callable[[Usd.Stage], None]) -> Path:
-    """A flattened copy of a file with something changed."""
-    layer = Usd.Stage.Open(str(source)).Flatten()
-    stage = Usd.Stage.Open(layer)
-    change(stage)
-    layer.Export(str(target))
-    return target
 
 
 # -- what works ---------------------------------------------------------------------------------

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cli_runner import run
 from conftest import REPOSITORY, shared_data
 from pxr import Usd, UsdSkel
-from test_fill_library import run
 
 from usdhand import api
 from usdhand.api import filling

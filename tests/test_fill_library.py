@@ -9,26 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from cli_runner import run
 from conftest import REPOSITORY
 from pxr import Sdf, Usd
 
 from usdhand.api import filling
-from usdhand.cli import main
 from usdhand.errors import InputError
 from usdhand.fill import MotionLibrary
 
 GESTURES = REPOSITORY / "samples" / "gestures"
 CHARACTERS = REPOSITORY / "samples" / "characters"
 NAMES = ("big_01", "ok_01", "ok_02", "wipe_01")
-
-
-def run(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture

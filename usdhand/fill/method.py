@@ -123,11 +123,6 @@ def space_for(library: MotionLibrary, part: Part, settings: FillSettings) -> Sea
     return search_space(library, part, metric(settings.metric), settings.segmentation)
 
 
-def fingers_move(clip: Clip, hands: Hands, side: Side) -> bool:
-    """Whether a hand's fingers have motion of their own."""
-    return side in hands.frames and _moves(hands.encode(clip), hands, side)
-
-
 def _moves(channels: Channels, hands: Hands, side: Side) -> bool:
     return fingers_moving(channels.select(all_channels(side, hands.frames[side].names)).values)
 
