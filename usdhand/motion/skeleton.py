@@ -46,12 +46,18 @@ class Skeleton:
     parents : (joints,) index of the parent, -1 for a root
     bind : (joints, 4, 4) joint-to-world matrices of the bind pose, for column vectors, cm
     rest : (joints, 4, 4) joint-to-parent matrices of the rest pose, cm
+    aliases : names that a file gives to its joints besides their own, such as the humanoid bones of
+        a VRM avatar: one a joint ("" for none), or empty
+    originals : the joints' names in the file where they are no legal USD names: one a joint, or
+        empty where all are as they were
     """
 
     joints: tuple[str, ...]
     parents: NDArray[np.intp]
     bind: Array
     rest: Array
+    aliases: tuple[str, ...] = ()
+    originals: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.joints)
