@@ -7,8 +7,8 @@ from pathlib import Path
 
 from usdhand.anatomy import SIDES, Conventions, Hands, Side, load_conventions, map_character
 from usdhand.compare import Comparison, compare_clips
-from usdhand.errors import HandNotFoundError, InputError, UsageError
-from usdhand.formats.usd.stage import find_character
+from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.formats.files import reopened
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 
@@ -66,7 +66,7 @@ def write_clip(
     OutputError
         if the output is refused or cannot be written.
     """
-    character = find_character(source_file(clip), clip.origin.skeleton_path)
+    character = reopened(clip)
     changed = [int(j) for f in find_hands(clip, conventions).frames.values() for j in f.joints]
     write_motion(
         character, clip, changed, Path(output), flatten=flatten, force=force, inputs=inputs
@@ -78,10 +78,3 @@ def compare(
 ) -> Comparison:
     """Compare motion B with motion A; see `usdhand.compare.compare_clips`."""
     return compare_clips(a, b, find_hands(a, conventions), find_hands(b, conventions), align)
-
-
-def source_file(clip: Clip) -> Path:
-    """Return the file that a clip was read from; InputError for a clip made in memory."""
-    if clip.origin.path is None:
-        raise InputError(f"{clip.name}: this clip was not read from a file, so there is no stage.")
-    return clip.origin.path

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from usdhand.anatomy import SIDES, Conventions, Side, load_conventions
-from usdhand.api.clips import find_hands, source_file
+from usdhand.api.clips import find_hands
 from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
 from usdhand.fill import (
     Filled,
@@ -25,6 +25,7 @@ from usdhand.fill import (
 from usdhand.fill.candidates import SearchSpace
 from usdhand.fill.library import Left, Part
 from usdhand.fill.reconstruction import HandError, reconstruction_errors
+from usdhand.formats.files import read_clip, reopened, source_file
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.library import (
     is_library,
@@ -32,8 +33,6 @@ from usdhand.formats.usd.library import (
     relative_path,
     write_library,
 )
-from usdhand.formats.usd.read import read_clip
-from usdhand.formats.usd.stage import find_character
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 
@@ -254,7 +253,7 @@ def write_filled(
     The variant set ``fingers`` is on the new SkelAnimation; ``choice_1``, the best, is selected.
     """
     best = filled.clips[0]
-    character = find_character(source_file(best), best.origin.skeleton_path)
+    character = reopened(best)
     sides = [side for part in filled.parts for side in part.part]
     hands = find_hands(best, conventions, sides)
     changed = [int(j) for frames in hands.frames.values() for j in frames.joints]

@@ -10,11 +10,10 @@ from typing import get_args
 import numpy as np
 
 from usdhand.anatomy import SIDES, Conventions, Side
-from usdhand.api.clips import find_hands, source_file
+from usdhand.api.clips import find_hands
 from usdhand.errors import UsageError
+from usdhand.formats.files import read_any, reopened
 from usdhand.formats.usd import rig as usd_rig
-from usdhand.formats.usd.read import clip_from_character, read_character
-from usdhand.formats.usd.stage import find_character
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.reduce import (
@@ -130,8 +129,7 @@ def expand_onto(
     The body keeps the target's own motion, its ends held, or its bind pose where it has none.
     """
     stored = usd_rig.read_stored_rig(path)
-    character = find_character(Path(target), skel)
-    body = clip_from_character(character) if character.animation else read_character(target, skel)
+    body, _ = read_any(target, skel)
     body = _in_time_of(body, stored.clip)
     return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
 
@@ -148,8 +146,9 @@ def write_rig(
     reduction: Reduction, output: str | Path, *, flatten: bool = False, force: bool = False
 ) -> None:
     """Write a reduced clip as a rig over the file it was read from."""
-    character = find_character(source_file(reduction.clip), reduction.clip.origin.skeleton_path)
-    usd_rig.write_rig(reduction, character, Path(output), flatten=flatten, force=force)
+    usd_rig.write_rig(
+        reduction, reopened(reduction.clip), Path(output), flatten=flatten, force=force
+    )
 
 
 def _same_skeleton(a: Clip, b: Clip) -> bool:

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from usdhand.anatomy import SIDES, Conventions, Side
-from usdhand.api.clips import find_hands, source_file
+from usdhand.api.clips import find_hands
 from usdhand.errors import UsageError
-from usdhand.formats.usd.stage import find_character
+from usdhand.formats.files import reopened
 from usdhand.formats.usd.warp import author_warps
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
@@ -97,7 +97,7 @@ def write_spliced(
     wrist : whether the wrists have changed as well
     """
     clip = spliced.clip
-    character = find_character(source_file(clip), clip.origin.skeleton_path)
+    character = reopened(clip)
     hands = find_hands(clip, conventions, list(spliced.hands))
     changed = [int(j) for frames in hands.frames.values() for j in frames.joints]
     if wrist:

@@ -38,11 +38,12 @@ def command(
       usdhand check samples/gestures
     """
     from usdhand.errors import UsdHandError
+    from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.formats.usd.check import check_file
     from usdhand.report.document import document, dumps
     from usdhand.report.results import check_result
 
-    paths = find_files(files)
+    paths = find_files(files, USD_SUFFIXES)
     results: list[dict[str, Any]] = []
     code = 0
     for path in with_progress(paths, "checking"):

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from usdhand.errors import InputError, UsageError
+from usdhand.formats.suffixes import READABLE
 
 if TYPE_CHECKING:
     from usdhand.errors import UsdHandError
     from usdhand.motion import Clip
 
 F = TypeVar("F", bound=Callable[..., Any])
-USD_PATTERNS = (".usd", ".usda", ".usdc", ".usdz")
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
@@ -71,7 +71,7 @@ def files_argument(name: str = "files") -> Callable[[F], F]:
     return click.argument(name, nargs=-1, required=True)
 
 
-def find_files(arguments: Iterable[str], suffixes: Sequence[str] = USD_PATTERNS) -> list[Path]:
+def find_files(arguments: Iterable[str], suffixes: Sequence[str] = READABLE) -> list[Path]:
     """Files named, in folders, or matching wildcards; sorted, each once.
 
     Raises

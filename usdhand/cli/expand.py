@@ -65,7 +65,7 @@ def command(
     """
     from usdhand import api
     from usdhand.formats.output import check_output
-    from usdhand.formats.usd.stage import USD_SUFFIXES
+    from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps
     from usdhand.report.results import problems_data
 

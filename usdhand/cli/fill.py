@@ -106,7 +106,7 @@ def command(
     from usdhand.api import filling
     from usdhand.fill import PAPER, FillSettings
     from usdhand.formats.output import check_output
-    from usdhand.formats.usd.stage import USD_SUFFIXES
+    from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import fill_result
 

@@ -76,13 +76,10 @@ def command(
 def _inspect(path: Path, skel: str | None, conventions: Conventions | None) -> dict[str, Any]:
     from usdhand.api.clips import find_hands
     from usdhand.errors import HandNotFoundError
-    from usdhand.formats.usd.read import bind_pose_clip, clip_from_character
-    from usdhand.formats.usd.stage import find_character
+    from usdhand.formats.files import read_any
     from usdhand.report.results import inspect_result
 
-    character = find_character(path, skel)
-    animated = character.animation is not None
-    clip = clip_from_character(character) if animated else bind_pose_clip(character)
+    clip, animated = read_any(path, skel)
     try:
         return inspect_result(clip, find_hands(clip, conventions), animated)
     except HandNotFoundError as error:

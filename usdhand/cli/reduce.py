@@ -204,7 +204,7 @@ def _outputs(paths: list[Path], output: Path) -> list[Path]:
 def _check_outputs(outputs: list[Path], inputs: list[Path], force: bool) -> None:
     from usdhand.errors import OutputError
     from usdhand.formats.output import check_folder, check_output
-    from usdhand.formats.usd.stage import USD_SUFFIXES
+    from usdhand.formats.suffixes import USD_SUFFIXES
 
     if len(set(outputs)) < len(outputs):
         raise OutputError("Two clips have the same name, so their rigs would replace each other.")

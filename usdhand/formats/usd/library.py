@@ -28,7 +28,8 @@ from usdhand.fill.library import (
 )
 from usdhand.fill.segment import Segmentation
 from usdhand.formats.output import check_output
-from usdhand.formats.usd.stage import USD_SUFFIXES, open_stage
+from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.formats.usd.stage import open_stage
 from usdhand.formats.usd.write import save_layer
 
 VERSION = 1

@@ -20,7 +20,7 @@ from usdhand.formats.usd.curves import (
     joint_targets,
     read_curve,
 )
-from usdhand.formats.usd.names import illegal_names, legal_name
+from usdhand.formats.usd.names import illegal_names, legal_name, with_names
 from usdhand.formats.usd.poses import AuthoredPoses, authored_poses, local_matrices, placed_skeleton
 from usdhand.formats.usd.samples import Track, steady
 from usdhand.formats.usd.stage import Character, damage_refused, find_character
@@ -95,6 +95,7 @@ def _animated_clip(character: Character) -> Clip:
     )
     q, t = _place(rotations, translations, parents, world)
     skeleton, repaired = placed_skeleton(joints, parents, poses, world, local_matrices(q[0], t[0]))
+    skeleton = with_names(skeleton, character.skeleton)
     step = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
     origin = replace(
         _origin(character, world),
@@ -130,6 +131,7 @@ def _still_clip(character: Character) -> Clip:
         rot.from_matrix(local[None, :, :3, :3]), local[None, :, :3, 3].copy(), parents, world
     )
     skeleton, repaired = placed_skeleton(joints, parents, poses, world, local_matrices(q[0], t[0]))
+    skeleton = with_names(skeleton, character.skeleton)
     problems = (
         *character.problems,
         *_name_problems(character, joints),

@@ -11,10 +11,10 @@ from typing import Any
 from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
 from usdhand.errors import InputError, UsageError
+from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.motion import Problem
 
 MOST_NAMED = 8  # skeletons in a message
-USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,9 @@ from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
 from usdhand.errors import InputError, OutputError, UsdHandError
 from usdhand.formats.output import check_output, written_beside
+from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.animation import author_animation, author_variants
 from usdhand.formats.usd.stage import (
-    USD_SUFFIXES,
     Character,
     binding_prim,
     find_skeletons,
@@ -159,10 +159,14 @@ def _verify(path: Path) -> None:
 def _layer_over(stage: Usd.Stage, output: Path) -> Sdf.Layer:
     """Return a layer over a stage that says the same about units, axes and time.
 
-    A root layer without ``timeCodesPerSecond`` would silently rescale time to 24.
+    A root layer without ``timeCodesPerSecond`` would silently rescale time to 24. What is on a
+    stage in memory is copied, since there is no file to be over.
     """
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     source = stage.GetRootLayer()
+    if source.anonymous:
+        layer.TransferContent(source)
+        return layer
     for field in source.pseudoRoot.ListInfoKeys():
         if field not in LAYER_FIELDS:
             layer.pseudoRoot.SetInfo(field, source.pseudoRoot.GetInfo(field))

@@ -1,0 +1,186 @@
+"""Reading and writing motion in any format: USD, BVH, glTF, VRM and FBX look alike from here."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from usdhand.errors import InputError, UsageError
+from usdhand.formats.suffixes import FORMATS, READABLE, USD_SUFFIXES
+from usdhand.formats.usd import read as usd
+from usdhand.formats.usd.character import character_of, legal_clip
+from usdhand.formats.usd.stage import Character, find_character
+from usdhand.motion import Clip, Problem
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What to read of a file, and what it means where it does not say so itself.
+
+    Attributes
+    ----------
+    skel : path or name of the skeleton where there are several
+    animation : name of the animation where there are several (never in USD)
+    cm_per_unit : centimetres of one unit, instead of what the file says or what is guessed
+    up : "Y" or "Z", likewise
+    """
+
+    skel: str | None = None
+    animation: str | None = None
+    cm_per_unit: float | None = None
+    up: str | None = None
+
+
+DEFAULT = Reading()
+
+
+def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFAULT) -> Clip:
+    """Read the motion of one character from a file of any format.
+
+    Parameters
+    ----------
+    path : a file with one of the suffixes `usdhand.formats.suffixes.READABLE`
+    skel : path or name of the skeleton where there are several
+    reading : more to say about files whose format leaves it open
+
+    Returns
+    -------
+    Clip
+        with everything that is odd or was guessed in ``problems``.
+
+    Raises
+    ------
+    InputError
+        if the file, skeleton or animation cannot be used.
+    UsageError
+        if there are several skeletons or animations and none is chosen.
+    """
+    path, reading = Path(path), _with_skel(reading, skel)
+    if is_usd(path):
+        return usd.read_clip(path, _usd_skel(path, reading))
+    return legal_clip(_reader(path).read_clip(path, **_options(reading)))
+
+
+def read_character(path: str | Path, skel: str | None = None, reading: Reading = DEFAULT) -> Clip:
+    """Read a character that may have no motion: a clip of one frame at its bind pose.
+
+    Raises the same errors as `read_clip`, except for a missing animation.
+    """
+    path, reading = Path(path), _with_skel(reading, skel)
+    if is_usd(path):
+        return usd.read_character(path, _usd_skel(path, reading))
+    options = _options(reading)
+    del options["animation"]
+    return legal_clip(_reader(path).read_character(path, **options))
+
+
+def read_any(
+    path: str | Path, skel: str | None = None, reading: Reading = DEFAULT
+) -> tuple[Clip, bool]:
+    """Read a character's motion, or its bind pose where it has none; and whether it moves.
+
+    Raises the errors of `read_character`.
+    """
+    path, reading = Path(path), _with_skel(reading, skel)
+    if is_usd(path):
+        character = find_character(path, _usd_skel(path, reading))
+        if character.animation is None:
+            return usd.bind_pose_clip(character), False
+        return usd.clip_from_character(character), True
+    animated = bool(_reader(path).animation_names(path))
+    return (read_clip if animated else read_character)(path, None, reading), animated
+
+
+def animation_names(path: str | Path) -> tuple[str, ...]:
+    """Names of the animations that a file holds; ("",) for USD, where one is bound."""
+    path = Path(path)
+    return ("",) if is_usd(path) else tuple(_reader(path).animation_names(path))
+
+
+def source_file(clip: Clip) -> Path:
+    """Return the file that a clip was read from; InputError for a clip made in memory."""
+    if clip.origin.path is None:
+        raise InputError(f"{clip.name}: this clip was not read from a file, so there is no stage.")
+    return clip.origin.path
+
+
+def reopened(clip: Clip) -> Character:
+    """Return the character that a clip was read from, to write over it.
+
+    Raises
+    ------
+    InputError
+        if the clip was not read from a file.
+    """
+    path, origin = source_file(clip), clip.origin
+    if is_usd(path):
+        return find_character(path, origin.skeleton_path)
+    reading = Reading(
+        origin.skeleton_path or None,
+        origin.animation_path or None,
+        origin.cm_per_unit,
+        origin.up_axis,
+    )
+    animated = bool(origin.animation_path)
+    source = (read_clip if animated else read_character)(path, None, reading)
+    return character_of(source, animated=animated)
+
+
+def write_other(clip: Clip, path: Path, suffix: str, up: str = "Y") -> tuple[Problem, ...]:
+    """Write a clip to exactly ``path`` in the format of ``suffix``, which is not USD.
+
+    Returns what the format could not keep.
+    """
+    module = importlib.import_module(f"{FORMATS[suffix]}.write")
+    options = {"up": up} if suffix == ".bvh" else {}
+    return tuple(module.write_clip(clip, path, **options))
+
+
+def is_usd(path: Path) -> bool:
+    """Whether a file is USD by its suffix, which must be one that is read at all.
+
+    Raises
+    ------
+    InputError
+        if it is of no format that is read here.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in READABLE:
+        if not path.exists():
+            raise InputError(f"{path}: no such file.")
+        if path.is_dir():
+            raise InputError(f"{path} is a folder, not a file.")
+        raise InputError(
+            f"{path}: '{path.suffix}' files are not read; expected one of {', '.join(READABLE)}."
+        )
+    return suffix in USD_SUFFIXES
+
+
+def _reader(path: Path) -> Any:
+    if not path.exists():
+        raise InputError(f"{path}: no such file.")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder, not a file.")
+    return importlib.import_module(f"{FORMATS[path.suffix.lower()]}.read")
+
+
+def _with_skel(reading: Reading, skel: str | None) -> Reading:
+    return reading if skel is None else replace(reading, skel=skel)
+
+
+def _options(reading: Reading) -> dict[str, Any]:
+    return {
+        "skel": reading.skel,
+        "animation": reading.animation,
+        "cm_per_unit": reading.cm_per_unit,
+        "up": reading.up,
+    }
+
+
+def _usd_skel(path: Path, reading: Reading) -> str | None:
+    for name, value in (("--animation", reading.animation), ("--units", reading.cm_per_unit)):
+        if value is not None:
+            raise UsageError(f"{path}: {name} is for other formats; a USD file says this itself.")
+    return reading.skel

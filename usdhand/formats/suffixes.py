@@ -1,0 +1,16 @@
+"""Which files are read and written, told by their suffix."""
+
+from __future__ import annotations
+
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+# Suffix -> package of the reader and writer; each is imported when such a file is met.
+FORMATS = {
+    ".bvh": "usdhand.formats.bvh",
+    ".glb": "usdhand.formats.gltf",
+    ".gltf": "usdhand.formats.gltf",
+    ".vrm": "usdhand.formats.gltf",
+    ".vrma": "usdhand.formats.gltf",
+    ".fbx": "usdhand.formats.fbx",
+}
+READABLE = (*USD_SUFFIXES, *FORMATS)
+WRITABLE = (*USD_SUFFIXES, ".bvh", ".glb", ".gltf")
