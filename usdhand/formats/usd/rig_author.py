@@ -38,7 +38,14 @@ def author_rig(layer: Sdf.Layer, path: Sdf.Path, reduction: Reduction) -> None:
     if clip.origin.path is not None:
         _set(prim, "usdhand:sourceHash", _TYPES.String, file_hash(clip.origin.path))
     for side, frames in reduction.hands.frames.items():
-        _set(prim, f"usdhand:{side}:joints", _TYPES.TokenArray, Vt.TokenArray(list(frames.names)))
+        # The joints' own names too, so that other programs can turn them without finding the hand.
+        for name, joints in (
+            ("joints", frames.names),
+            ("skeletonJoints", [clip.skeleton.joints[j] for j in frames.joints]),
+            ("referenceJoints", [clip.skeleton.joints[j] for j in frames.references]),
+        ):
+            tokens = Vt.TokenArray(list(joints))
+            _set(prim, f"usdhand:{side}:{name}", _TYPES.TokenArray, tokens)
         for name, values in (
             ("referenceFrames", frames.reference_frames),
             ("jointFrames", frames.joint_frames),
