@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -15,7 +14,7 @@ from usdhand.errors import UsageError
 from usdhand.formats.files import read_any, reopened
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.motion import Clip
-from usdhand.motion.resample import interpolate, interpolate_rotations
+from usdhand.motion.resample import in_time_of
 from usdhand.reduce import (
     PRESETS,
     Fit,
@@ -130,7 +129,7 @@ def expand_onto(
     """
     stored = usd_rig.read_stored_rig(path)
     body, _ = read_any(target, skel)
-    body = _in_time_of(body, stored.clip)
+    body = in_time_of(body, stored.clip)
     return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
 
 
@@ -155,24 +154,4 @@ def _same_skeleton(a: Clip, b: Clip) -> bool:
     """Whether two clips are of one character, so that they may share anatomical frames."""
     return a.skeleton.joints == b.skeleton.joints and np.allclose(
         a.skeleton.bind, b.skeleton.bind, atol=1e-4
-    )
-
-
-def _in_time_of(body: Clip, other: Clip) -> Clip:
-    """Return a body at the frames of another clip, its ends held."""
-    seconds = np.arange(len(other)) / other.fps
-    frames = np.clip(seconds * body.fps, 0, len(body) - 1)
-    per_second = body.origin.time_codes_per_second
-    origin = replace(
-        body.origin,
-        first_time_code=other.start * per_second,
-        time_codes_per_frame=per_second / other.fps,
-    )
-    return replace(
-        body,
-        rotations=interpolate_rotations(body.rotations, frames),
-        translations=interpolate(body.translations, frames),
-        scales=interpolate(body.scales, frames),
-        fps=other.fps,
-        origin=origin,
     )

@@ -20,6 +20,7 @@ VERBS = {
     "splice": "Put the fingers of a hand clip on a body clip, retimed to it.",
     "evaluate": "Measure how well a library tells fingers from arms.",
     "compare": "Compare two motions: degrees, fingertips, smoothness, lag.",
+    "convert": "Convert between USD, BVH, glTF and FBX; put fingers on other characters.",
     "check": "Check files with UsdValidation and rules of our own.",
     "schema": "Print the folder of the USD schema for PXR_PLUGINPATH_NAME.",
 }

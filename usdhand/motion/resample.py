@@ -57,6 +57,26 @@ def resample(clip: Clip, fps: float) -> Clip:
     )
 
 
+def in_time_of(body: Clip, other: Clip) -> Clip:
+    """Return a body at the frames of another clip, from its first frame on, its ends held."""
+    seconds = np.arange(len(other)) / other.fps
+    frames = np.clip(seconds * body.fps, 0, len(body) - 1)
+    per_second = body.origin.time_codes_per_second
+    origin = replace(
+        body.origin,
+        first_time_code=other.start * per_second,
+        time_codes_per_frame=per_second / other.fps,
+    )
+    return replace(
+        body,
+        rotations=interpolate_rotations(body.rotations, frames),
+        translations=interpolate(body.translations, frames),
+        scales=interpolate(body.scales, frames),
+        fps=other.fps,
+        origin=origin,
+    )
+
+
 def _sampled(
     values: Array, frames: Array, between: Callable[[Array, Array, Array], Array]
 ) -> Array:

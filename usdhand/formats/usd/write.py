@@ -68,9 +68,9 @@ def write_motion(
     for motion in (clip, *(variants or {}).values()):
         if not np.isfinite(motion.rotations).all():
             raise InputError(f"{character.path}: the result has rotations that are no numbers.")
-    layer = _layer_over(character.stage, output)
+    layer = layer_over(character.stage, output)
     with Sdf.ChangeBlock():
-        for path in _instances_above(character):
+        for path in instances_above(character):
             Sdf.CreatePrimInLayer(layer, path).SetInfo("instanceable", False)
         root = character.root.GetPath()
         animation = free_child(character.stage, root, ANIMATION_NAME)
@@ -79,9 +79,9 @@ def write_motion(
         else:
             times = author_animation(layer, animation, character, clip, changed)
         if character.animation is not None:
-            _copy_blend_shapes(layer, animation, UsdSkel.Animation(character.animation))
-        _bind(layer, character, animation)
-        _extend_time(layer, times)
+            copy_blend_shapes(layer, animation, UsdSkel.Animation(character.animation))
+        bind_animation(layer, character, animation)
+        extend_time(layer, times)
         if author is not None:
             author(layer, root)
     save_layer(layer, output, flatten=flatten)
@@ -156,7 +156,7 @@ def _verify(path: Path) -> None:
             raise OutputError(f"{asset} cannot be found from {path.parent}.")
 
 
-def _layer_over(stage: Usd.Stage, output: Path) -> Sdf.Layer:
+def layer_over(stage: Usd.Stage, output: Path) -> Sdf.Layer:
     """Return a layer over a stage that says the same about units, axes and time.
 
     A root layer without ``timeCodesPerSecond`` would silently rescale time to 24. What is on a
@@ -189,7 +189,7 @@ def _relative(path: Path, output: Path) -> str:
     return relative if relative.startswith("..") else f"./{relative}"
 
 
-def _instances_above(character: Character) -> list[Sdf.Path]:
+def instances_above(character: Character) -> list[Sdf.Path]:
     """Instances that must be opened up, since nothing can be authored inside them."""
     paths = character.skeleton.GetPath().GetPrefixes()
     return [p for p in paths if character.stage.GetPrimAtPath(p).IsInstance()]
@@ -204,7 +204,8 @@ def free_child(stage: Usd.Stage, parent: Sdf.Path, name: str) -> Sdf.Path:
     return path
 
 
-def _copy_blend_shapes(layer: Sdf.Layer, path: Sdf.Path, source: UsdSkel.Animation) -> None:
+def copy_blend_shapes(layer: Sdf.Layer, path: Sdf.Path, source: UsdSkel.Animation) -> None:
+    """Give the animation at ``path`` the blend shapes of another one."""
     prim = layer.GetPrimAtPath(path)
     for attribute, variability in (
         (source.GetBlendShapesAttr(), Sdf.VariabilityUniform),
@@ -220,7 +221,8 @@ def _copy_blend_shapes(layer: Sdf.Layer, path: Sdf.Path, source: UsdSkel.Animati
             spec.default = attribute.Get()
 
 
-def _bind(layer: Sdf.Layer, character: Character, animation: Sdf.Path) -> None:
+def bind_animation(layer: Sdf.Layer, character: Character, animation: Sdf.Path) -> None:
+    """Make a character play an animation: override the binding that is in force."""
     owner = binding_prim(character.skeleton)
     sharing = [s for s in find_skeletons(character.stage) if binding_prim(s) == owner]
     if len(sharing) > 1:  # a binding that other skeletons inherit stays theirs
@@ -234,7 +236,8 @@ def _bind(layer: Sdf.Layer, character: Character, animation: Sdf.Path) -> None:
     relationship.targetPathList.explicitItems = [animation]
 
 
-def _extend_time(layer: Sdf.Layer, times: NDArray[np.float64]) -> None:
+def extend_time(layer: Sdf.Layer, times: NDArray[np.float64]) -> None:
+    """Let a layer's time range hold these time codes."""
     if not layer.HasStartTimeCode() or layer.startTimeCode > times[0]:
         layer.startTimeCode = float(times[0])
     if not layer.HasEndTimeCode() or layer.endTimeCode < times[-1]:

@@ -1,0 +1,214 @@
+"""A USD character written anew as a file of its own, with all else that its stage holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+
+from usdhand.formats.output import check_output
+from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.formats.usd.animation import author_animation
+from usdhand.formats.usd.character import gf_matrices
+from usdhand.formats.usd.names import author_names, legal_skeleton
+from usdhand.formats.usd.poses import authored_poses
+from usdhand.formats.usd.stage import Character, bound_animation, find_skeletons
+from usdhand.formats.usd.world import world_above
+from usdhand.formats.usd.write import (
+    bind_animation,
+    copy_blend_shapes,
+    extend_time,
+    free_child,
+    instances_above,
+    layer_over,
+    save_layer,
+    stage_files,
+)
+from usdhand.motion import Clip
+from usdhand.motion.rotations import Array
+
+# Problems of a clip whose animation is written again to mend them.
+MENDED = {"missing-translations", "missing-scales", "fewer-joints", "illegal-joint-name"}
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How a whole stage is measured, placed and timed anew.
+
+    Attributes
+    ----------
+    per_second : time codes a second; None to leave them
+    offset : added to all time codes, after they count to the new rate
+    scale : factor on everything's size
+    up : "Y" or "Z"; None to leave it
+    """
+
+    per_second: float | None = None
+    offset: float = 0.0
+    scale: float = 1.0
+    up: str | None = None
+
+
+def placed(character: Character, placement: Placement) -> Character:
+    """Return a character on a stage in memory that shows its own stage with another placement.
+
+    Scale and up axis are transforms on the root prims, so that meshes, cameras and lights go with
+    the skeleton.
+    """
+    source = character.stage
+    layer = layer_over(source, character.path)
+    layer.subLayerPaths.clear()
+    layer.subLayerPaths.append(source.GetRootLayer().realPath)
+    layer.subLayerOffsets[0] = Sdf.LayerOffset(placement.offset)
+    old, new = source.GetTimeCodesPerSecond(), placement.per_second
+    if new is not None:
+        layer.timeCodesPerSecond = layer.framesPerSecond = new
+    for field in ("startTimeCode", "endTimeCode"):
+        if source.HasAuthoredMetadata(field):
+            moved = source.GetMetadata(field) * (new or old) / old + placement.offset
+            layer.pseudoRoot.SetInfo(field, moved)
+    stage = Usd.Stage.Open(layer)
+    _turn_and_scale(stage, placement)
+    skeleton = stage.GetPrimAtPath(character.skeleton.GetPath())
+    return replace(character, stage=stage, skeleton=skeleton, animation=bound_animation(skeleton))
+
+
+def write_placed(
+    character: Character,
+    clip: Clip,
+    output: Path,
+    *,
+    edited: bool,
+    force: bool = False,
+    inputs: Sequence[Path] = (),
+) -> None:
+    """Write one file with all of a character's stage, its motion being ``clip`` if ``edited``.
+
+    Joint names become legal and poses that are missing are written. The stage's own motion is kept
+    as it is where it is whole.
+
+    Raises
+    ------
+    OutputError
+        if the output is refused or cannot be written; nothing is left behind then.
+    """
+    check_output(
+        output, [character.path, *stage_files(character.stage), *inputs], force, USD_SUFFIXES
+    )
+    layer = layer_over(character.stage, output)
+    legal = replace(clip, skeleton=legal_skeleton(clip.skeleton))
+    with Sdf.ChangeBlock():
+        for path in instances_above(character):
+            Sdf.CreatePrimInLayer(layer, path).SetInfo("instanceable", False)
+    if edited or any(problem.code in MENDED for problem in clip.problems):
+        with Sdf.ChangeBlock():
+            _author_motion(layer, character, legal)
+    _mend_skeleton(layer, character, legal)
+    save_layer(layer, output, flatten=True)
+
+
+def _turn_and_scale(stage: Usd.Stage, placement: Placement) -> None:
+    turn = 0.0
+    up = str(UsdGeom.GetStageUpAxis(stage))
+    if placement.up is not None and placement.up != up:
+        turn = 90.0 if placement.up == "Z" else -90.0
+        UsdGeom.SetStageUpAxis(stage, placement.up)
+    if turn == 0.0 and placement.scale == 1.0:
+        return
+    for prim in stage.GetPseudoRoot().GetChildren():
+        xformable = UsdGeom.Xformable(prim)
+        if not xformable:
+            continue
+        order = xformable.GetXformOpOrderAttr().Get() or Vt.TokenArray()
+        own = []
+        if turn:
+            op = xformable.AddRotateXOp(UsdGeom.XformOp.PrecisionDouble, "usdhandUpAxis")
+            op.Set(turn)
+            own.append(op.GetOpName())
+        if placement.scale != 1.0:
+            op = xformable.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "usdhandScale")
+            op.Set(Gf.Vec3d(placement.scale))
+            own.append(op.GetOpName())
+        xformable.GetXformOpOrderAttr().Set(Vt.TokenArray([*own, *order]))
+
+
+def _author_motion(layer: Sdf.Layer, character: Character, clip: Clip) -> None:
+    source = character.animation
+    shared = [s for s in find_skeletons(character.stage) if bound_animation(s) == source]
+    every = range(len(clip.skeleton))
+    if source is not None and len(shared) == 1 and not source.IsInstanceProxy():
+        path = source.GetPath()  # stronger samples replace the weaker ones as a whole
+    else:
+        path = free_child(character.stage, character.root.GetPath(), "Motion")
+    times = author_animation(layer, path, character, clip, every)
+    if source is None or path != source.GetPath():
+        if source is not None:
+            copy_blend_shapes(layer, path, UsdSkel.Animation(source))
+        bind_animation(layer, character, path)
+    layer.startTimeCode, layer.endTimeCode = float(times[0]), float(times[-1])
+    extend_time(layer, times)
+
+
+def _mend_skeleton(layer: Sdf.Layer, character: Character, clip: Clip) -> None:
+    """Write what the skeleton lacks: legal names, bind and rest pose, the binding schema."""
+    stage = Usd.Stage.Open(layer)
+    prim = stage.GetPrimAtPath(character.skeleton.GetPath())
+    skeleton, count = UsdSkel.Skeleton(prim), len(clip.skeleton)
+    names = [str(token) for token in skeleton.GetJointsAttr().Get()]
+    renamed = {a: b for a, b in zip(names, clip.skeleton.joints, strict=True) if a != b}
+    if renamed:
+        skeleton.GetJointsAttr().Set(Vt.TokenArray(list(clip.skeleton.joints)))
+        author_names(prim, clip.skeleton)
+        _rename(stage, renamed)
+    poses, _ = authored_poses(character, count, 1.0)
+    if poses.bind is None or poses.rest is None:
+        local = _local_in_file(character, clip)
+        if poses.rest is None:
+            skeleton.CreateRestTransformsAttr(gf_matrices(local))
+        if poses.bind is None:
+            skeleton.CreateBindTransformsAttr(gf_matrices(_accumulated(local, clip)))
+    if not prim.HasAPI(UsdSkel.BindingAPI):
+        UsdSkel.BindingAPI.Apply(prim)
+
+
+def _rename(stage: Usd.Stage, renamed: dict[str, str]) -> None:
+    """Rename joints wherever meshes and animations list them."""
+    for prim in stage.Traverse():
+        for name in ("skel:joints", "joints"):
+            attribute = prim.GetAttribute(name)
+            if not attribute or prim.IsA(UsdSkel.Skeleton):
+                continue
+            listed = [str(token) for token in attribute.Get() or ()]
+            if any(joint in renamed for joint in listed):
+                attribute.Set(Vt.TokenArray([renamed.get(joint, joint) for joint in listed]))
+
+
+def _local_in_file(character: Character, clip: Clip) -> Array:
+    """Joint-to-parent matrices (n, 4, 4) of the clip's bind pose in the file's units and axes."""
+    world = world_above(character.skeleton)
+    skeleton = clip.skeleton
+    above = _matrix(world.rotation[0], world.translation[0])
+    parents = np.where(
+        (skeleton.parents >= 0)[:, None, None], skeleton.bind[skeleton.parents], above
+    )
+    local = np.linalg.inv(parents) @ skeleton.bind
+    local[:, :3, 3] /= world.scale
+    return np.asarray(local)
+
+
+def _matrix(rotation: Array, translation: Array) -> Array:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, translation
+    return matrix
+
+
+def _accumulated(local: Array, clip: Clip) -> Array:
+    result = local.copy()
+    for j in clip.skeleton.order:
+        parent = int(clip.skeleton.parents[j])
+        if parent >= 0:
+            result[j] = result[parent] @ local[j]
+    return result

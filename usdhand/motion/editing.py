@@ -1,0 +1,88 @@
+"""Clips cut, moved in time, scaled, or kept in place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from usdhand.errors import UsageError
+from usdhand.motion.clip import Clip
+from usdhand.motion.kinematics import forward_kinematics
+
+FRAME_TOLERANCE = 1e-6  # of a frame
+
+
+def trim(clip: Clip, first: float | None, last: float | None) -> Clip:
+    """Return the frames from one time code to another, both included.
+
+    Parameters
+    ----------
+    first, last : time codes of the clip's file; None for its first and last frame
+
+    Raises
+    ------
+    UsageError
+        if no frame lies between them.
+    """
+    codes = clip.time_codes
+    slack = FRAME_TOLERANCE * clip.origin.time_codes_per_frame
+    low = codes[0] if first is None else first
+    high = codes[-1] if last is None else last
+    inside = np.flatnonzero((codes >= low - slack) & (codes <= high + slack))
+    if not len(inside):
+        raise UsageError(
+            f"{clip.name}: no frame from {low:g} to {high:g}; its time codes are {codes[0]:g} to "
+            f"{codes[-1]:g}."
+        )
+    rows = slice(int(inside[0]), int(inside[-1]) + 1)
+    return replace(
+        clip,
+        rotations=clip.rotations[rows],
+        translations=clip.translations[rows],
+        scales=clip.scales[rows],
+        origin=replace(clip.origin, first_time_code=float(codes[rows.start])),
+    )
+
+
+def counted_in_frames(clip: Clip) -> Clip:
+    """Return the clip with a time code a frame, as files have that are made anew."""
+    origin = replace(
+        clip.origin,
+        time_codes_per_second=clip.fps,
+        first_time_code=clip.start * clip.fps,
+        time_codes_per_frame=1.0,
+    )
+    return replace(clip, origin=origin)
+
+
+def starting_at(clip: Clip, time_code: float) -> Clip:
+    """Return the clip with its first frame at ``time_code``."""
+    return replace(clip, origin=replace(clip.origin, first_time_code=float(time_code)))
+
+
+def scaled(clip: Clip, factor: float) -> Clip:
+    """Return the clip with a character of ``factor`` times its size.
+
+    Raises
+    ------
+    UsageError
+        if the factor is not a positive number.
+    """
+    if not (np.isfinite(factor) and factor > 0):
+        raise UsageError(f"A scale of {factor:g} cannot be meant: give a number > 0.")
+    bind, rest = clip.skeleton.bind.copy(), clip.skeleton.rest.copy()
+    bind[:, :3, 3] *= factor
+    rest[:, :3, 3] *= factor
+    skeleton = replace(clip.skeleton, bind=bind, rest=rest)
+    return replace(clip, skeleton=skeleton, translations=clip.translations * factor)
+
+
+def in_place(clip: Clip, hips: int) -> Clip:
+    """Return the clip with its ``hips`` staying over one spot; heading and height are kept."""
+    path = forward_kinematics(clip, [hips]).position(hips)
+    away = (path - path[0]) * np.array([1.0, 0.0, 1.0])
+    roots = np.flatnonzero(clip.skeleton.parents < 0)
+    translations = clip.translations.copy()
+    translations[:, roots] -= away[:, None]
+    return replace(clip, translations=translations)

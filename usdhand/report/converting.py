@@ -1,0 +1,48 @@
+"""What `convert` reports of one file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from usdhand.anatomy import Conventions, map_character
+from usdhand.errors import HandNotFoundError
+from usdhand.motion import Clip, Problem
+from usdhand.report.document import rounded
+from usdhand.report.results import problems_data
+
+
+def convert_result(
+    source: Clip,
+    clip: Clip,
+    animated: bool,
+    lost: Sequence[Problem],
+    conventions: Conventions | None = None,
+) -> dict[str, Any]:
+    """What was read, what was guessed, and what could not be kept."""
+    origin = source.origin
+    return {
+        "joints": len(clip.skeleton),
+        "animated": animated,
+        "frames": len(clip) if animated else 0,
+        "fps": rounded(clip.fps),
+        "start": rounded(clip.origin.first_time_code),
+        "read": {
+            "skeleton": origin.skeleton_path,
+            "animation": origin.animation_path or None,
+            "fps": rounded(source.fps),
+            "cm_per_unit": rounded(origin.cm_per_unit),
+            "up_axis": origin.up_axis,
+        },
+        "convention": _convention(clip, conventions),
+        "renamed_joints": len(clip.skeleton.originals),
+        "problems": problems_data(source.problems),
+        "lost": problems_data(lost),
+    }
+
+
+def _convention(clip: Clip, conventions: Conventions | None) -> str | None:
+    try:
+        return map_character(clip.skeleton, conventions).convention
+    except HandNotFoundError:
+        return None
