@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 
 from usdhand.anatomy import SIDES, Conventions, Side, load_conventions
 from usdhand.api.clips import find_hands
+from usdhand.api.finger_joints import lacks_fingers
 from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
 from usdhand.fill import (
     Filled,
@@ -27,6 +28,7 @@ from usdhand.fill.library import Left, Part
 from usdhand.fill.reconstruction import HandError, reconstruction_errors
 from usdhand.formats.files import read_clip, reopened, source_file
 from usdhand.formats.hashing import file_hash
+from usdhand.formats.usd.add_joints import author_joints, joint_count
 from usdhand.formats.usd.library import (
     is_library,
     read_library,
@@ -215,11 +217,14 @@ def fill_fingers(
     try:
         hands = find_hands(body, conventions, sides)
     except HandNotFoundError as error:
-        if _names_fingers(body):
+        bare = lacks_fingers(body, conventions, sides)
+        if not bare:
             raise
         raise HandNotFoundError(
-            f"{body.origin.path or body.name}: the skeleton has no finger joints, so there is "
-            "nothing to put finger motion on. Bind the body's motion to a character that has them."
+            f"{body.origin.path or body.name}: the skeleton has no finger joints below its "
+            f"{' and '.join(bare)} wrist, so there is nothing to put finger motion on. "
+            "--add-fingers adds those of the library's character, scaled to the body; "
+            "--fingers-from CHARACTER those of another one."
         ) from error
     content = file_hash(body.origin.path) if body.origin.path else None
     return fill(
@@ -231,12 +236,6 @@ def fill_fingers(
         replace_motion=replace_motion,
         content_hash=content,
     )
-
-
-def _names_fingers(clip: Clip) -> bool:
-    """Whether any joint is named like a finger."""
-    words = ("thumb", "index", "finger", "middle", "ring", "pinky", "little")
-    return any(word in name.lower() for name in clip.skeleton.names for word in words)
 
 
 def write_filled(
@@ -251,23 +250,26 @@ def write_filled(
     """Write a filled body as a layer over its file; alternatives are variants of the animation.
 
     The variant set ``fingers`` is on the new SkelAnimation; ``choice_1``, the best, is selected.
+    Joints that the body has beyond its file (`add_finger_joints`) are added to its Skeleton.
     """
     best = filled.clips[0]
     character = reopened(best)
     sides = [side for part in filled.parts for side in part.part]
     hands = find_hands(best, conventions, sides)
-    changed = [int(j) for frames in hands.frames.values() for j in frames.joints]
+    changed = {int(j) for frames in hands.frames.values() for j in frames.joints}
+    changed |= set(range(joint_count(character), len(best.skeleton)))
     digits = len(str(len(filled.clips)))  # so that editors sort them
     variants = {f"choice_{i:0{digits}}": clip for i, clip in enumerate(filled.clips, 1)}
     write_motion(
         character,
         best,
-        changed,
+        sorted(changed),
         Path(output),
         flatten=flatten,
         force=force,
         inputs=inputs,
         variants=variants if len(variants) > 1 else None,
+        author=lambda layer, _: author_joints(layer, character, best.skeleton),
     )
 
 

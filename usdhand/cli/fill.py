@@ -58,6 +58,17 @@ from usdhand.cli.common import (
 @click.option(
     "--replace", "replace_motion", is_flag=True, help="Replace fingers that already move."
 )
+@click.option(
+    "--add-fingers",
+    is_flag=True,
+    help="Give a body without finger joints those of the library's character, scaled to it.",
+)
+@click.option(
+    "--fingers-from",
+    metavar="CHARACTER",
+    type=click.Path(path_type=Path),
+    help="Add the finger joints of this character instead of the library's.",
+)
 @side_option
 @flatten_option
 @skel_option
@@ -78,6 +89,8 @@ def command(
     alternatives: int,
     couple: bool,
     replace_motion: bool,
+    add_fingers: bool,
+    fingers_from: Path | None,
     side: str,
     flatten: bool,
     skel: str | None,
@@ -104,6 +117,7 @@ def command(
 
     from usdhand import api
     from usdhand.api import filling
+    from usdhand.api.finger_joints import fingers_from_library, fingers_like, lacks_fingers
     from usdhand.fill import PAPER, FillSettings
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
@@ -117,12 +131,27 @@ def command(
         couple=couple,
         **{name: value for name, value in given.items() if value is not None},
     )
-    check_output(output, [body, library], force, USD_SUFFIXES)
+    given_files = [body, library, *([fingers_from] if fingers_from else [])]
+    check_output(output, given_files, force, USD_SUFFIXES)
     check_report(report, force)
     conventions = api.conventions_from(maps)
     motions = filling.read_library(library)
     clip = api.read_clip(body, skel)
     warn_of(clip, quiet)
+    bare = lacks_fingers(clip, conventions, sides(side))
+    added = None
+    if add_fingers or fingers_from:
+        if not bare:
+            warn(f"{body} has finger joints, so none are added", quiet)
+        elif fingers_from:
+            added = fingers_like(clip, fingers_from, conventions, bare)
+        else:
+            folder = library.absolute().parent
+            added = fingers_from_library(clip, motions, folder, conventions, bare)
+    elif bare and len(bare) < len(sides(side)):
+        warn(f"{body}: the {bare[0]} hand has no finger joints; --add-fingers adds some", quiet)
+    if added:
+        clip = added.grafted.clip
     filled = filling.fill_fingers(
         clip,
         motions,
@@ -146,6 +175,9 @@ def command(
             filled, output, flatten=flatten, force=force, conventions=conventions, inputs=[library]
         )
     result = fill_result(filled, motions, clip) | {"output": None if dry_run else str(output)}
+    if added:
+        joints = {hand: list(paths) for hand, paths in added.grafted.added.items()}
+        result |= {"added_joints": joints, "fingers_from": added.source}
     for hand, found in result["hands"].items():
         odd = [s["stretched"] for s in found["segments"] if s["stretched"] != 1.0]
         if odd:
@@ -157,7 +189,7 @@ def command(
             )
     shown = {"preset": preset, "side": side, "replace": replace_motion, "metric": settings.metric}
     more = {"k": settings.k, "alternatives": alternatives, "couple": couple, "skel": skel}
-    text = dumps(document("fill", [body, library, *maps], shown | more, result))
+    text = dumps(document("fill", [*given_files, *maps], shown | more, result))
     write_report(report, text, force)
     if as_json:
         click.echo(text)
@@ -168,6 +200,8 @@ def command(
 
 def _text(result: dict[str, Any], verbose: bool) -> str:
     lines = []
+    for side, paths in result.get("added_joints", {}).items():
+        lines.append(f"{side} hand: {len(paths)} joints added, as of {result['fingers_from']}")
     for side, hand in result["hands"].items():
         clips = {s["clip"] for s in hand["segments"]}
         seams = hand["seams"]

@@ -1,0 +1,101 @@
+"""Joints added to a skeleton behind its own, as opinions over it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Sdf, UsdSkel, Vt
+
+from usdhand.formats.usd.names import ALIASES, ORIGINALS
+from usdhand.formats.usd.stage import Character
+from usdhand.formats.usd.world import world_above
+from usdhand.motion import Skeleton
+from usdhand.motion.rotations import Array
+
+
+def joint_count(character: Character) -> int:
+    """Number of joints that a character's Skeleton has in its file."""
+    return len(UsdSkel.Skeleton(character.skeleton).GetJointsAttr().Get() or ())
+
+
+def author_joints(layer: Sdf.Layer, character: Character, skeleton: Skeleton) -> None:
+    """Author the joints that ``skeleton`` has beyond those in its file.
+
+    The file's own joints, whose order meshes refer to by number, keep their places and their
+    matrices to the bit.
+    """
+    prim = UsdSkel.Skeleton(character.skeleton)
+    own = [str(joint) for joint in prim.GetJointsAttr().Get()]
+    more = range(len(own), len(skeleton))
+    if skeleton.joints[: len(own)] != tuple(own):
+        raise AssertionError("joints are added behind those of the file")
+    if not more:
+        return
+    world = world_above(character.skeleton)
+    rest = prim.GetRestTransformsAttr().Get()
+    bind = prim.GetBindTransformsAttr().Get()
+    local = _in_units(skeleton.rest, world.scale)
+    if rest is None or len(rest) != len(own):
+        local[skeleton.parents < 0] = _below(
+            skeleton.rest[skeleton.parents < 0],
+            world.rotation[0],
+            world.translation[0],
+            world.scale,
+        )
+        all_rest = local
+    else:
+        all_rest = np.concatenate([_matrices(rest), local[len(own) :]])
+    if bind is None or len(bind) != len(own):
+        all_bind = _below(skeleton.bind, world.rotation[0], world.translation[0], world.scale)
+    else:
+        # From the wrist's own matrix, in whatever space the exporter wrote it.
+        all_bind = np.concatenate([_matrices(bind), np.empty((len(more), 4, 4))])
+        for j in more:
+            all_bind[j] = all_bind[skeleton.parents[j]] @ local[j]
+    types = Sdf.ValueTypeNames
+    spec = Sdf.CreatePrimInLayer(layer, character.skeleton.GetPath())
+    _set(spec, "joints", types.TokenArray, Vt.TokenArray(list(skeleton.joints)))
+    for name, values, authored in (
+        ("restTransforms", all_rest, rest),
+        ("bindTransforms", all_bind, bind),
+    ):
+        matrices = [Gf.Matrix4d(m.T.tolist()) for m in values]
+        if authored is not None and len(authored) == len(own):
+            matrices[: len(own)] = list(authored)
+        _set(spec, name, types.Matrix4dArray, Vt.Matrix4dArray(matrices))
+    if names := prim.GetJointNamesAttr().Get():
+        own_names = [str(name) for name in names]
+        added = [skeleton.names[j] for j in more]
+        _set(spec, "jointNames", types.TokenArray, Vt.TokenArray([*own_names, *added]))
+    for name, kept in ((ORIGINALS, skeleton.originals), (ALIASES, skeleton.aliases)):
+        if kept:
+            _set(spec, name, types.TokenArray, Vt.TokenArray(list(kept)), custom=True)
+
+
+def _set(
+    prim: Sdf.PrimSpec, name: str, kind: Sdf.ValueTypeName, value: Any, custom: bool = False
+) -> None:
+    attribute = prim.attributes.get(name) or Sdf.AttributeSpec(
+        prim, name, kind, Sdf.VariabilityUniform, custom
+    )
+    attribute.default = value
+
+
+def _matrices(values: Vt.Matrix4dArray) -> Array:
+    """(n, 4, 4) for column vectors."""
+    return np.swapaxes(np.array(values, dtype=np.float64), 1, 2)
+
+
+def _in_units(matrices: Array, unit: float) -> Array:
+    result = matrices.copy()
+    result[:, :3, 3] /= unit
+    return result
+
+
+def _below(matrices: Array, rotation: Array, translation: Array, unit: float) -> Array:
+    """World matrices (n, 4, 4) in the space below a placement, in the file's units."""
+    result = matrices.copy()
+    result[:, :3, :3] = rotation.T @ matrices[:, :3, :3]
+    result[:, :3, 3] = (matrices[:, :3, 3] - translation) @ rotation / unit
+    return result
