@@ -31,7 +31,7 @@ from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 
 # Problems of a clip whose animation is written again to mend them.
-MENDED = {"missing-translations", "missing-scales", "fewer-joints", "illegal-joint-name"}
+MENDED = {"missing-translations", "missing-scales"}
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ def write_placed(
         output, [character.path, *stage_files(character.stage), *inputs], force, USD_SUFFIXES
     )
     layer = layer_over(character.stage, output)
-    legal = replace(clip, skeleton=legal_skeleton(clip.skeleton))
     with Sdf.ChangeBlock():
         for path in instances_above(character):
             Sdf.CreatePrimInLayer(layer, path).SetInfo("instanceable", False)
     if edited or any(problem.code in MENDED for problem in clip.problems):
+        changed = range(len(clip.skeleton)) if edited else ()
         with Sdf.ChangeBlock():
-            _author_motion(layer, character, legal)
-    _mend_skeleton(layer, character, legal)
+            _author_motion(layer, character, clip, changed)
+    _mend_skeleton(layer, character, clip)
     save_layer(layer, output, flatten=True)
 
 
@@ -135,15 +135,16 @@ def _turn_and_scale(stage: Usd.Stage, placement: Placement) -> None:
         xformable.GetXformOpOrderAttr().Set(Vt.TokenArray([*own, *order]))
 
 
-def _author_motion(layer: Sdf.Layer, character: Character, clip: Clip) -> None:
+def _author_motion(
+    layer: Sdf.Layer, character: Character, clip: Clip, changed: Sequence[int]
+) -> None:
     source = character.animation
     shared = [s for s in find_skeletons(character.stage) if bound_animation(s) == source]
-    every = range(len(clip.skeleton))
     if source is not None and len(shared) == 1 and not source.IsInstanceProxy():
         path = source.GetPath()  # stronger samples replace the weaker ones as a whole
     else:
         path = free_child(character.stage, character.root.GetPath(), "Motion")
-    times = author_animation(layer, path, character, clip, every)
+    times = author_animation(layer, path, character, clip, changed)
     if source is None or path != source.GetPath():
         if source is not None:
             copy_blend_shapes(layer, path, UsdSkel.Animation(source))
@@ -157,11 +158,11 @@ def _mend_skeleton(layer: Sdf.Layer, character: Character, clip: Clip) -> None:
     stage = Usd.Stage.Open(layer)
     prim = stage.GetPrimAtPath(character.skeleton.GetPath())
     skeleton, count = UsdSkel.Skeleton(prim), len(clip.skeleton)
-    names = [str(token) for token in skeleton.GetJointsAttr().Get()]
-    renamed = {a: b for a, b in zip(names, clip.skeleton.joints, strict=True) if a != b}
-    if renamed:
-        skeleton.GetJointsAttr().Set(Vt.TokenArray(list(clip.skeleton.joints)))
-        author_names(prim, clip.skeleton)
+    legal = legal_skeleton(clip.skeleton)
+    pairs = zip(clip.skeleton.joints, legal.joints, strict=True)
+    if renamed := {a: b for a, b in pairs if a != b}:
+        skeleton.GetJointsAttr().Set(Vt.TokenArray(list(legal.joints)))
+        author_names(prim, legal)
         _rename(stage, renamed)
     poses, _ = authored_poses(character, count, 1.0)
     if poses.bind is None or poses.rest is None:
