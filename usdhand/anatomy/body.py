@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
@@ -152,24 +152,33 @@ def _legs(
     skeleton: Skeleton, points: Array, spine: Chain, heights: Sequence[int]
 ) -> tuple[Chain, Chain] | None:
     """Return the two long branches off the spine that end farthest from the chest."""
+    chest = points[spine[0]]
+
+    def reach(line: Chain) -> float:
+        return float(np.linalg.norm(points[line[-1]] - chest))
+
     for below, joint in pairwise(spine):
         branches = [c for c in skeleton.children[joint] if c != below and heights[c] >= 2]
-        lines = [_deepest_line(skeleton, c, heights) for c in branches]
-        lines.sort(key=lambda line: -float(np.linalg.norm(points[line[-1]] - points[spine[0]])))
+        lines = [_line_to_farthest(skeleton, c, reach) for c in branches]
+        # What ends hardly farther away than it starts is a skirt, a pouch, a control.
+        lines = [line for line in lines if reach(line) > 1.5 * reach(line[:1])]
         if len(lines) >= 2:
+            lines.sort(key=reach, reverse=True)
             return lines[0], lines[1]
     return None
 
 
 def _toe_direction(points: Array, legs: Iterable[Chain], up: Array) -> Array | None:
-    """Sum of the legs' level bones (feet, toes), None if there are none."""
-    total = np.zeros(3)
+    """Sum of the legs' level bones (feet, toes), None where they are no part of the legs."""
+    total, length = np.zeros(3), 0.0
     for leg in legs:
         for bone in np.diff(points[list(leg)], axis=0):
+            length += float(np.linalg.norm(bone))
             level = bone - up * (bone @ up)
             if np.linalg.norm(level) > abs(bone @ up):
                 total += level
-    return unit(total) if np.linalg.norm(total) > 1e-6 else None
+    # Feet and toes are 0.13 to 0.22 of real legs; knees and ankles a little out of line much less.
+    return unit(total) if np.linalg.norm(total) > 0.08 * length else None
 
 
 def heights_of(skeleton: Skeleton) -> list[int]:
@@ -182,8 +191,7 @@ def heights_of(skeleton: Skeleton) -> list[int]:
     return heights
 
 
-def _deepest_line(skeleton: Skeleton, joint: int, heights: Sequence[int]) -> Chain:
-    line = [joint]
-    while skeleton.children[line[-1]]:
-        line.append(max(skeleton.children[line[-1]], key=lambda c: (heights[c], -c)))
-    return tuple(line)
+def _line_to_farthest(skeleton: Skeleton, joint: int, reach: Callable[[Chain], float]) -> Chain:
+    """Line of joints from ``joint`` down to the leaf of the largest ``reach``."""
+    lines = [_line_to_farthest(skeleton, c, reach) for c in skeleton.children[joint]]
+    return (joint, *max(lines, key=reach)) if lines else (joint,)

@@ -31,42 +31,40 @@ class FoundHand:
 
 
 def chirality(points: Array, wrist: int, joints: Mapping[str, int]) -> Side | None:
-    """Side of one hand from its own shape, None for a hand too flat to tell.
+    """Side of one hand from its own shape, None for a hand too flat to tell or at odds with itself.
 
-    Fingers bend toward the palm and the thumb stands on the palm's side of the hand. On a left
-    hand, ``wrist to fingers`` x ``little to index finger`` points out of the palm.
+    Fingers bend toward the palm, the thumb stands on the palm's side of the hand, and the knuckles
+    arch away from it. On a left hand, ``wrist to fingers`` x ``little to index finger`` points out
+    of the palm.
     """
-    roots = [points[joints[d + "MCP"]] for d in FINGERS if d + "MCP" in joints]
+    roots = np.array([points[joints[d + "MCP"]] for d in FINGERS if d + "MCP" in joints])
     if len(roots) < 2:
         return None
-    along = unit(np.mean(roots, axis=0) - points[wrist])
-    normal = unit(np.cross(along, roots[0] - roots[-1]))
-    bends, weights = 0.0, 0
+    along = roots.mean(axis=0) - points[wrist]
+    width = roots[0] - roots[-1]
+    palm, across = float(np.linalg.norm(along)), unit(width)
+    normal = unit(np.cross(along, width))
+    bends = [0.0]
     for digit in FINGERS:
         line = [joints[digit + j] for j in digit_joints(digit) if digit + j in joints]
         if len(line) == 3:
             first, second = (unit(b) for b in np.diff(points[line], axis=0))
-            bends += float((second - first) @ normal)
-            weights += 1
-    curl = bends / max(weights, 1)
-    ends = [joints[j] for j in ("ThumbIP", "ThumbMCP") if j in joints]
-    palm = float(np.linalg.norm(np.mean(roots, axis=0) - points[wrist]))
-    stand = float((points[ends[0]] - points[wrist]) @ normal) / max(palm, 1e-9) if ends else 0.0
-    # Sines of some degrees: below that modelling noise decides.
-    signs = [np.sign(v) for v, least in ((curl, 0.06), (stand, 0.1)) if abs(v) > least]
-    if not signs or min(signs) != max(signs):
+            bends.append(-float(np.cross(first, second) @ across))  # however the MCP is bent
+    curl = sum(bends) / max(len(bends) - 1, 1)
+    ends = [points[joints[j]] - points[wrist] for j in ("ThumbMCP", "ThumbIP") if j in joints]
+    stand = float(ends[0] @ normal) / max(palm, 1e-9) if ends else 0.0
+    arch = -float((roots.mean(axis=0) - roots[[0, -1]].mean(axis=0)) @ normal)
+    # Sines of some degrees, below that modelling noise decides. Fingers straight or bent a little
+    # backward are usual: without the thumb only a clear bend counts. The arch is small: it only
+    # speaks against the others, as where a thumb is bound behind the hand.
+    cues = [stand] if abs(stand) > 0.1 else []
+    cues += [curl] if abs(curl) > (0.06 if cues else 0.22) else []
+    if not cues:
         return None
-    return "left" if signs[0] > 0 else "right"
-
-
-def thumb_direction(points: Array, wrist: int, joints: Mapping[str, int]) -> Array:
-    """Where the thumb stands off the hand, across the fingers (3,); zero without a thumb."""
-    roots = np.mean([points[joints[d + "MCP"]] for d in FINGERS if d + "MCP" in joints], axis=0)
-    ends = [joints[j] for j in ("ThumbIP", "ThumbMCP") if j in joints]
-    if not ends:
-        return np.zeros(3)
-    along, offset = unit(roots - points[wrist]), points[ends[0]] - points[wrist]
-    return unit(offset - along * (offset @ along))
+    cues += [arch] if abs(arch) > 0.007 * np.linalg.norm(width) else []
+    if min(cues) < 0 < max(cues):
+        return None
+    return "left" if cues[0] > 0 else "right"
 
 
 def first_is_left(
@@ -74,26 +72,47 @@ def first_is_left(
 ) -> dict[str, float]:
     """Votes on two hands: positive where the first is the left one, zero where nothing is known.
 
-    Feet count most: a character looks where its toes point. Thumbs point to the front in every
-    usual bind pose (palms down or toward the body), if not to the sides.
+    A character looks where its toes point, and a hand's shape is its own. Thumbs count least: they
+    show what is in front in usual bind poses only.
     """
     first, second = hands
     body = body_of(skeleton, points, [first.wrist, second.wrist])
     away = points[first.wrist] - points[second.wrist]
 
-    def vote(facing: Array) -> float:
+    def vote(facing: Array | None) -> float:
+        if facing is None:
+            return 0.0
         lateral = float(away @ np.cross(body.up, facing))
         return float(np.sign(lateral)) if abs(lateral) > 0.3 * np.linalg.norm(away) else 0.0
 
-    thumbs = sum((thumb_direction(points, h.wrist, h.joints) for h in hands), np.zeros(3))
-    thumbs = thumbs - body.up * (thumbs @ body.up)
     shape = float((shapes[0] == "left") + (shapes[1] == "right"))
     shape -= float((shapes[0] == "right") + (shapes[1] == "left"))
     return {
-        "the feet": 1.5 * vote(body.facing) if body.facing is not None else 0.0,
-        "the thumbs": vote(thumbs) if np.linalg.norm(thumbs) > 0.5 else 0.0,
-        "the hands' shape": float(np.sign(shape)),
+        "the feet": 1.5 * vote(body.facing),
+        "the thumbs": vote(_thumbs_ahead(points, hands, unit(away), body.up)),
+        "the hands' shape": 1.5 * float(np.sign(shape)),
     }
+
+
+def _thumbs_ahead(
+    points: Array, hands: Sequence[FoundHand], away: Array, up: Array
+) -> Array | None:
+    """Level direction of both thumbs, None unless the hands mirror each other as in a bind pose.
+
+    There the fingers point outward or down and the palms down or to the body, so that the thumbs
+    point forward, if not to the sides. ``away`` leads from the second hand to the first.
+    """
+    thumbs, outward = [], []
+    for hand, way in zip(hands, (away, -away), strict=True):
+        roots = [points[hand.joints[d + "MCP"]] for d in FINGERS if d + "MCP" in hand.joints]
+        along = unit(np.mean(roots, axis=0) - points[hand.wrist])
+        offset = points[hand.joints["ThumbIP"]] - points[hand.wrist]
+        thumbs.append(unit(offset - along * (offset @ along)))
+        outward.append(float(along @ way))
+    one, other = thumbs
+    alike = np.linalg.norm(one - 2 * (one @ away) * away - other) < 0.5
+    ahead = one + other - up * ((one + other) @ up)
+    return ahead if alike and min(outward) > -0.3 and np.linalg.norm(ahead) > 0.5 else None
 
 
 # --- hands ---------------------------------------------------------------------------------------
@@ -107,20 +126,23 @@ def hand_size(points: Array, hand: FoundHand) -> float:
 
 def find_hands(skeleton: Skeleton, points: Array) -> tuple[list[FoundHand], list[str]]:
     """Return the parts of a skeleton that have the shape of a hand, and why others have not."""
-    branches = _branches(skeleton, points)
-    hands, reasons = [], []
-    for root, chains in branches.items():
-        name = skeleton.names[root]
+    hands: dict[int, FoundHand] = {}
+    reasons: dict[int, str] = {}
+    for root, chains in _branches(skeleton, points).items():
+        above = skeleton.ancestors(root)
+        if any(joint in hands for joint in above):
+            continue
         found = _read_hand(skeleton, points, root, chains)
         if isinstance(found, str):
-            reasons.append(f"below {name}: {found}")
+            reasons[root] = f"below {skeleton.names[root]}: {found}"
         else:
-            hands.append(found)
-    return hands, reasons
+            hands[root] = found
+            reasons = {joint: why for joint, why in reasons.items() if joint not in above}
+    return list(hands.values()), list(reasons.values())
 
 
 def _branches(skeleton: Skeleton, points: Array) -> dict[int, list[Chain]]:
-    """Joints with three to five unbranched chains below them, the highest such joints only.
+    """Joints with three to five unbranched chains below them, the highest first.
 
     Leaves beside a longer branch (twists, attachment points) are no branches of their own.
     """
@@ -147,8 +169,7 @@ def _branches(skeleton: Skeleton, points: Array) -> dict[int, list[Chain]]:
     for joint in skeleton.order:
         is_branch = len(after[joint]) > 1 and (skeleton.parents[joint] < 0 or joint in kept)
         digits = [c for c in chains[joint] if len(c) >= 2]
-        inside = any(a in found for a in skeleton.ancestors(joint))
-        if is_branch and not inside and 3 <= len(digits) <= 5 and len(digits) == len(chains[joint]):
+        if is_branch and 3 <= len(digits) <= 5 and len(digits) == len(chains[joint]):
             found[joint] = digits
     return found
 
@@ -192,45 +213,75 @@ _Digits = dict[str, tuple[int | None, Chain, int | None]]
 
 
 def _digits(points: Array, wrist: int, chains: Sequence[Chain]) -> tuple[_Digits, str]:
-    """Name the chains of a hand: the thumb, then the fingers in order; or say what is odd."""
-    ways = np.array([unit(points[c[-1]] - points[c[0]]) for c in chains])
-    reach = np.array([np.linalg.norm(points[c[-1]] - points[wrist]) for c in chains])
-    longest = max(map(len, chains))
-    # The thumb points away from the others, ends nearer to the wrist, and has no metacarpal.
-    apart = np.array([_angle(w, ways.sum(axis=0) - w) for w in ways])
-    likeness = apart / 30 + 2 * (1 - reach / max(reach.max(), 1e-9))
-    likeness += [0.5 * (len(c) < longest) for c in chains]
-    thumb, second = np.argsort(-likeness)[:2]
-    # Thumbs of real rigs came out at 1.4 to 2, the next digit at most at 1.
-    if likeness[thumb] < 1.2 or likeness[thumb] - likeness[second] < 0.25:
+    """Name the chains of a hand: the thumb, then the fingers in order; or say what is odd.
+
+    The palm decides, which is the same in every pose: knuckles in a row at one distance from the
+    wrist, and the thumb's first joint much nearer, at the index finger's end of the row.
+    """
+    thumb = _thumb_of(points, wrist, chains)
+    if thumb is None:
         return {}, "no digit stands out as the thumb"
     fingers = [c for i, c in enumerate(chains) if i != thumb]
-    if max(_angle(w, ways.sum(axis=0) - ways[thumb]) for w in np.delete(ways, thumb, 0)) > 50:
-        return {}, "the chains point in different directions, as fingers do not"
     split = [_split_finger(points, wrist, c) for c in fingers]
     if any(len(line) < 2 for _, line, _ in split):
         return {}, "a chain has too few or too many joints for a finger"
     has_tips = any(tip is not None for _, _, tip in split)
+    carpal, thumb_line, thumb_tip = _split_thumb(chains[thumb], has_tips)
+    if len(thumb_line) < 3:
+        return {}, "the thumb has fewer than three joints"
     roots = points[[line[0] for _, line, _ in split]]
-    lengths = np.array(
-        [
-            np.linalg.norm(points[c[-1]] - points[s[1][0]])
-            for c, s in zip(fingers, split, strict=True)
-        ]
-    )
+    lengths = np.array([_length(points, line) for _, line, _ in split])
     palm = float(np.linalg.norm(roots - points[wrist], axis=1).mean())
-    if lengths.max() > 3 * lengths.min() or not 0.3 < palm / max(lengths.mean(), 1e-9) < 4:
+    if lengths.max() > 3 * lengths.min() or not 0.6 < palm / max(lengths.mean(), 1e-9) < 6:
         return {}, "the chains' lengths are not those of fingers"
-    _, spread, axes = np.linalg.svd(roots - roots.mean(axis=0))
+    middle = roots.mean(axis=0)
+    _, spread, axes = np.linalg.svd(roots - middle)
     if len(roots) > 2 and spread[1] > 0.6 * spread[0]:
         return {}, "the chains start on a ring, not in a row"
-    across = axes[0] * np.sign(
-        (points[list(chains[thumb])].mean(axis=0) - roots.mean(axis=0)) @ axes[0]
-    )
-    order = np.argsort(-(roots @ across))
-    named: _Digits = {"Thumb": _split_thumb(chains[thumb], has_tips)}
+    places = (roots - middle) @ axes[0]
+    side = float((points[thumb_line[0]] - middle) @ axes[0])
+    if abs(side) < 0.1 * np.ptp(places):
+        return {}, "the thumb starts at neither end of the row of fingers"
+    order = np.argsort(-places * np.sign(side))
+    if reason := _odd_row(np.abs(np.diff(places[order])), lengths[order] / lengths.max()):
+        return {}, reason
+    named: _Digits = {"Thumb": (carpal, thumb_line, thumb_tip)}
     named |= {digit: split[i] for digit, i in zip(FINGERS, order, strict=False)}
     return named, ""
+
+
+def _thumb_of(points: Array, wrist: int, chains: Sequence[Chain]) -> int | None:
+    """Chain of the thumb: counted from the ends, its first joint is far nearer to the wrist.
+
+    Of real hands, over the median of all digits: thumbs 0.25 to 0.48, fingers 0.92 to 1.18.
+    """
+    count = min(4, *map(len, chains))  # three joints and a tip: the metacarpals stay out of it
+    starts = np.linalg.norm(points[[c[-count] for c in chains]] - points[wrist], axis=1)
+    near = starts / max(float(np.median(starts)), 1e-9)
+    thumb, *fingers = np.argsort(near)
+    alone = near[thumb] < 0.65 and near[fingers[0]] > 0.75 and near[fingers[-1]] < 1.35
+    return int(thumb) if alone else None
+
+
+def _odd_row(gaps: Array, lengths: Array) -> str:
+    """Say why fingers in this order, thumb first, cannot be named by it; nothing if they can.
+
+    ``gaps`` lie between their first joints, ``lengths`` are relative to the longest finger. Of
+    three fingers one is missing: it is the little one where gaps and lengths are even.
+    """
+    if lengths[0] < 0.85 * lengths[-1]:
+        return "the fingers get longer away from the thumb"
+    if len(lengths) < 3:
+        return "two fingers and a thumb: which fingers they are cannot be told"
+    uneven = gaps.max() > 1.5 * gaps.min()
+    if len(lengths) == 3 and (uneven or lengths[2] < 0.85 or lengths[0] > 1.02 * lengths[1]):
+        return "of three fingers, which is the missing one cannot be told"
+    return ""
+
+
+def _length(points: Array, line: Chain) -> float:
+    """Length of a line of joints."""
+    return float(np.linalg.norm(np.diff(points[list(line)], axis=0), axis=1).sum())
 
 
 def _split_finger(points: Array, wrist: int, chain: Chain) -> tuple[int | None, Chain, int | None]:
