@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracle_2006 import algorithm_1, best_turn, distance_of_signs
 from scipy.spatial.transform import Rotation
 
-from usdhand.alignment.phase_dtw import phase_path, signs_along, tethered_path, turn_angles
+from usdhand.alignment.phase_dtw import phase_path, sign_costs, signs_along, turn_angles
 from usdhand.errors import UsageError
 from usdhand.splice.band import Pin, anchors_of, band_along, checked_pins, pinned_band
 from usdhand.splice.method import through_pins
@@ -114,25 +114,6 @@ def test_a_long_path_through_a_narrow_band() -> None:
     assert cost == 0
     assert (first == np.arange(n)).all()
     assert (last == first).all()
-
-
-def test_tethered_path_finds_a_shift_and_stays_without_one() -> None:
-    t = np.linspace(0, 6 * np.pi, 300)
-    hand = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
-    centre = np.arange(300.0)
-    shift = 3.0 * np.sin(np.pi * np.arange(300) / 299)
-    body = np.stack(
-        [
-            np.cos(np.interp(centre + shift, centre, t)),
-            np.sin(np.interp(centre + shift, centre, t)),
-            0 * t,
-        ],
-        axis=1,
-    )
-    found = tethered_path(body, hand, centre, 16, 0.5, 0.02, 8.0)
-    assert np.abs(found - shift).max() < 0.6
-    still = np.tile([1.0, 0.0, 0.0], (300, 1))
-    assert not tethered_path(still, still, centre, 16, 0.5, 0.02, 8.0).any()
 
 
 def test_pins_that_cannot_hold_are_named() -> None:

@@ -1,4 +1,4 @@
-"""Compiled: the two dynamic programmes of splice. Import late, numba takes half a second.
+"""Compiled: the dynamic programme of splice. Import late, numba takes half a second.
 
 *Rows* are frames of the body, *columns* frames of the hand clip; row i may use the columns
 ``low[i]`` to ``high[i]``, both included, and neither bound ever falls. Accumulated costs are kept
@@ -182,6 +182,17 @@ def _compare(
 
 
 @kernel
+def sign_costs(body: Words, hand: Words, columns: Ints) -> Costs:
+    """Costs (rows,) of the cells that a path of one column a row goes through, equation (6)."""
+    costs, one = np.zeros(len(columns), np.int32), np.zeros(1, np.int32)
+    for i in range(len(columns)):
+        j = columns[i]
+        _compare(body[0, i], body[1, i], hand[0, j : j + 1], hand[1, j : j + 1], 0, 0, one)
+        costs[i] = one[0]
+    return costs
+
+
+@kernel
 def _accumulate(local: Costs, above: Costs, here: Costs, first: int, last: int) -> None:
     for j in range(_U(first), _U(last + 1)):
         here[j + _U(1)] = min(above[j], above[j + _U(1)]) + local[j]
@@ -225,64 +236,3 @@ def _way_back(moves: Bytes, starts: Ints, low: Ints, high: Ints) -> tuple[Ints, 
         last[i] = j
     first[0] = low[0]
     return first, last
-
-
-@kernel
-def tethered_path(
-    body: Doubles,
-    hand: Doubles,
-    centre: Doubles,
-    reach: int,
-    step: float,
-    noise: float,
-    tether: float,
-) -> Doubles:
-    """Offsets from a path that bring unit vectors closest, without going far or fast.
-
-    Minimises the sum over the rows of (angle / noise)^2 + (offset / tether)^2; from row to row the
-    offset changes by one step at most. Of equal ones the smaller change wins.
-
-    Parameters
-    ----------
-    body : (rows, 3) unit vectors
-    hand : (columns, 3) unit vectors, taken between columns linearly
-    centre : (rows,) fractional columns of the path
-    reach : largest offset, in steps
-    step : of the offset, in columns
-    noise : of the angle, radians
-    tether : columns
-
-    Returns
-    -------
-    (rows,) offsets in columns; those of the first and last row are 0.
-    """
-    rows, states, last = len(body), 2 * reach + 1, len(hand) - 1
-    above = np.full(states + 2, np.inf)
-    here = np.full(states + 2, np.inf)
-    above[reach + 1] = 0.0
-    moves = np.zeros((rows, states), np.int8)
-    for i in range(rows):
-        for k in range(states):
-            offset = (k - reach) * step
-            at = min(max(centre[i] + offset, 0.0), float(last))
-            j = min(int(at), last - 1)
-            t = at - j
-            dot = 0.0
-            for d in range(3):
-                dot += body[i, d] * (hand[j, d] * (1.0 - t) + hand[j + 1, d] * t)
-            # of an angle a, 2 - 2 cos(a) is a^2 nearly
-            local = (2.0 - 2.0 * dot) / noise**2 + (offset / tether) ** 2
-            best, move = above[k + 1], 0
-            if above[k] < best:
-                best, move = above[k], -1
-            if above[k + 2] < best:
-                best, move = above[k + 2], 1
-            here[k + 1] = best + local
-            moves[i, k] = move
-        above, here = here, above
-    offsets = np.zeros(rows)
-    k = reach
-    for i in range(rows - 1, -1, -1):
-        offsets[i] = (k - reach) * step
-        k += moves[i, k]
-    return offsets

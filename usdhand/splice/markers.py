@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,6 +82,18 @@ def hand_markers(clip: Clip, hands: Hands, side: Side, fps: float) -> Markers:
         _facing(clip, hands, at),
         fps,
         ROOM if origin is None else clip.skeleton.names[origin],
+    )
+
+
+def shown_at(markers: Markers, frames: Array, fps: float) -> Markers:
+    """Markers at fractional frames, as frames of another rate; the first and last one stay on."""
+    return replace(
+        markers,
+        positions=interpolate(markers.positions, frames),
+        wrist=interpolate(markers.wrist, frames),
+        forearm=interpolate(markers.forearm, frames),
+        facing=None if markers.facing is None else interpolate(markers.facing, frames),
+        fps=fps,
     )
 
 

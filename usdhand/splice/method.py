@@ -22,9 +22,10 @@ from usdhand.splice.band import (
 )
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.merge import with_fingers, with_wrist
-from usdhand.splice.palms import refined
-from usdhand.splice.phases import Align, Directions, phase_path, smoothed, steadied
+from usdhand.splice.phases import Align, Directions, phase_path, settled, smoothed, steadied
 from usdhand.splice.quality import Phase, phase_qualities
+from usdhand.splice.refine import refined
+from usdhand.splice.warps import monotone, through_pins
 
 Wrist = Literal["body", "hands"]
 
@@ -32,6 +33,8 @@ Wrist = Literal["body", "hands"]
 STILL_CM = 1.0
 # Lengths that differ by more than this factor are worth a warning.
 UNLIKELY_FACTOR = 2.0
+# Rounds of matching signs with the hand clip in the body's time.
+ROUNDS = 2
 # Beyond this many cells, the way back alone would need a gigabyte.
 MOST_CELLS = 4 * 2**30
 
@@ -52,10 +55,9 @@ class SpliceSettings:
     directions : of the derivatives' signs, see `usdhand.splice.phases.sign_axes`
     fps : rate at which motion is compared
     smoothing : of positions before derivatives are taken, standard deviation in seconds
+    shared_smoothing : the same, as soon as both clips are in the body's time
     dead_zone : share of their RMS below which derivatives count as zero
-    palm_smoothing : of the wrists' bend, seconds
-    tether : frames that pass 2 may typically move pass 1 by; 0: no pass 2
-    warp_smoothing : of the warp after pass 1 and after pass 2, frames
+    tether : seconds of the hand clip that pass 2 may typically move pass 1 by; 0: no pass 2
     """
 
     band: tuple[float, float] = (0.3, 0.1)
@@ -66,10 +68,9 @@ class SpliceSettings:
     directions: Directions = "spread"
     fps: float = 60.0
     smoothing: float = 0.045
+    shared_smoothing: float = 0.065
     dead_zone: float = 0.06
-    palm_smoothing: float = 0.03
-    tether: float = 1.5
-    warp_smoothing: tuple[float, float] = (5.0, 4.0)
+    tether: float = 0.12
 
     def __post_init__(self) -> None:
         if not all(0.0 < width <= 1.0 for width in self.band):
@@ -177,52 +178,36 @@ def align(
         near = band_along(path.middle, band, reach)
         path = steadied(body, hand, path, near, *signs, settings.directions)
     own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps
+    room = _room(own_times, pins)
+    first = path.open_ended
+    for _ in range(ROUNDS):
+        first = through_pins(first / hand.fps, own_times, pins) * hand.fps
+        signs = settings.shared_smoothing, settings.dead_zone
+        first = settled(
+            body, hand, first, room * body.fps, *signs, settings.align, settings.directions
+        )
 
     def in_time(warp: Array) -> Array:
         seconds = np.clip(np.interp(times, own_times, warp / hand.fps), 0.0, end)
         return through_pins(seconds, times, pins)
 
-    first = monotone(smooth_warp(path.open_ended, settings.warp_smoothing[0]))
     if settings.tether == 0:
         return in_time(first), in_time(first), path.cost
-    width = settings.band[1] * len(body)
-    second = refined(body, hand, first, width, settings.palm_smoothing, settings.tether)
-    second = monotone(smooth_warp(second, settings.warp_smoothing[1]))
+    tether = settings.tether * hand.fps
+    reach = min(settings.band[1] * len(body) / 2, 2 * tether)
+    first = through_pins(first / hand.fps, own_times, pins) * hand.fps
+    second = refined(
+        body, hand, first, np.minimum(room * hand.fps, reach), settings.align, tether
+    )
     return in_time(second), in_time(first), path.cost
 
 
-def smooth_warp(warp: Array, deviation: float) -> Array:
-    """Warp (rows,) smoothed by a Gaussian, its ends and its mean slope kept."""
-    line = np.linspace(warp[0], warp[-1], len(warp))
-    return np.asarray(line + smoothed(warp - line, deviation))
-
-
-def monotone(warp: Array) -> Array:
-    """Warp that never runs backward, by the mean of the bounds from either side."""
-    return np.asarray((np.maximum.accumulate(warp) + np.minimum.accumulate(warp[::-1])[::-1]) / 2)
-
-
-def through_pins(warp: Array, times: Array, pins: Sequence[Pin]) -> Array:
-    """Warp moved so that it goes through every pin within its tolerance, and exactly where 0.
-
-    What is missing at the pins is spread linearly over the time between them; nothing passes a pin
-    before its time.
-    """
-    if not pins:
-        return warp
-    at = np.array([p.body for p in pins])
-    wanted = np.array([p.hand for p in pins])
-    slack = np.array([p.tolerance for p in pins])
-    off = wanted - np.interp(at, times, warp)
-    missing = np.sign(off) * np.maximum(np.abs(off) - slack, 0.0)
-    ends = (times[0] - 1e-9, times[-1] + 1e-9)
-    knots, values = np.array([ends[0], *at, ends[1]]), np.array([0.0, *missing, 0.0])
-    lowest = np.maximum.accumulate([-np.inf, *(wanted - slack)])
-    highest = np.minimum.accumulate([np.inf, *(wanted + slack)[::-1]])[::-1]
-    least = lowest[np.searchsorted(at, times, "right")]
-    most = highest[np.searchsorted(at, times, "left")]
-    moved = np.clip(warp + np.interp(times, knots, values), least, most)
-    return np.asarray(np.maximum.accumulate(moved))
+def _room(times: Array, pins: Sequence[Pin]) -> Array:
+    """Seconds (times,) by which a warp that goes through all pins may still move."""
+    room = np.full(len(times), np.inf)
+    for pin in pins:
+        room[np.abs(times - pin.body) < 0.75 * times[1]] = pin.tolerance
+    return room
 
 
 def _band(rows: int, columns: int, settings: SpliceSettings, pins: Sequence[Pin]) -> Band:

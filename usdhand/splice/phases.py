@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from usdhand.motion.rotations import Array
 from usdhand.splice.band import Band
-from usdhand.splice.markers import Markers
+from usdhand.splice.markers import Markers, shown_at
+from usdhand.splice.warps import EXACT, monotone, stiff
 
 Align = Literal["local", "trunk"]
 Directions = Literal["spread", "axes"]
@@ -19,6 +20,17 @@ WINDOW = 5  # frames of the window that a turn about the vertical is fitted to
 TURNS = 32
 WAITING = 3  # rows at an end that share a column, beyond which the hand clip is not only slow there
 STEADY_S = 2.0  # standard deviation of the time over which performers keep their direction
+WIDE = 12.0  # frames of a Gaussian beyond which running means do as well
+
+# How far, in seconds, the path may still move once the hand clip is in the body's time.
+NEAR_S = 1 / 3
+# Seconds by which a match is shifted to see whether that costs anything: what a frame is evidence
+# for; the cost that counts as full evidence; the share that every frame has.
+SHIFT_S, FULL_EVIDENCE, LEAST_EVIDENCE = 0.1, 60.0, 0.02
+# How much a warp resists bending, beside a frame of full evidence.
+STIFFNESS = 500.0
+
+_NO_TURN = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +123,69 @@ def steadied(
     turned = facing(body, -steady_turns(body, hand, path.middle))
     ours = derivative_signs(turned, smoothing, dead_zone, np.zeros(1), directions)
     theirs = derivative_signs(hand, smoothing, dead_zone, np.zeros(1), directions)
-    nothing = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
-    first, last, cost = phase_dtw.phase_path(ours[0], theirs, *nothing, band.low, band.high)
+    first, last, cost = phase_dtw.phase_path(ours[0], theirs, *_NO_TURN, band.low, band.high)
     return Path(first, last, int(cost))
+
+
+def settled(
+    body: Markers,
+    hand: Markers,
+    warp: Array,
+    room: Array,
+    smoothing: float,
+    dead_zone: float,
+    align: Align = "local",
+    directions: Directions = "spread",
+) -> Array:
+    """Warp (rows,) in columns, matched again with the hand clip in the time that the warp gives it.
+
+    Now that both clips are smoothed over the same part of the motion, smoothing moves no phase of
+    one against the other. Where a shift would cost nothing, as where the hand rests, the warp takes
+    its course from the frames around.
+
+    Parameters
+    ----------
+    room : (rows,) body frames by which the warp may move, 0: not at all
+    """
+    from usdhand.alignment import phase_dtw
+
+    rows = np.arange(len(body))
+    ours, theirs = (
+        derivative_signs(m, smoothing, dead_zone, np.zeros(1), directions)
+        for m in alike(body, shown_at(hand, warp, body.fps), align)
+    )
+    reach = np.minimum(room, NEAR_S * body.fps).astype(np.int64)
+    low = np.maximum.accumulate(np.maximum(rows - reach, 0))
+    high = np.minimum.accumulate(np.minimum(rows + reach, rows[-1])[::-1])[::-1]
+    first, last, cost = phase_dtw.phase_path(ours[0], theirs, *_NO_TURN, low, high)
+    path = Path(first, last, int(cost))
+    weights = _evidence(ours[0], theirs[0], path.middle, SHIFT_S * body.fps)
+    weights[[0, -1]] = 1.0
+    weights[reach == 0] = EXACT
+    matched = np.interp(path.open_ended, rows, warp)
+    return monotone(stiff(matched, weights, STIFFNESS * (body.fps / 60.0) ** 4))
+
+
+def alike(body: Markers, hand: Markers, align: Align) -> tuple[Markers, Markers]:
+    """Both markers, of as many frames, in axes that they share."""
+    if align == "trunk":
+        return facing_forward(body), facing_forward(hand)
+    turns = steady_turns(body, hand, np.arange(len(body)))
+    return facing(body, -turns), hand
+
+
+def _evidence(
+    ours: NDArray[np.uint64], theirs: NDArray[np.uint64], path: Array, shift: float
+) -> Array:
+    """(rows,) 0 to 1: how much more the signs would differ if the path went by, earlier or later."""
+    from usdhand.alignment.phase_dtw import sign_costs
+
+    def costs(by: float) -> Array:
+        columns = np.clip(np.rint(path + by), 0, theirs.shape[1] - 1).astype(np.int64)
+        return np.asarray(sign_costs(ours, theirs, columns), np.float64)
+
+    more = smoothed((costs(shift) + costs(-shift)) / 2 - costs(0.0), shift / 2)
+    return np.clip(more / FULL_EVIDENCE, LEAST_EVIDENCE, 1.0)
 
 
 def steady_turns(body: Markers, hand: Markers, path: Array) -> Array:
@@ -129,8 +201,13 @@ def steady_turns(body: Markers, hand: Markers, path: Array) -> Array:
 
 def smoothed(curve: Array, deviation: float, order: int = 0) -> Array:
     """Gaussian smoothing (or its derivative) along axis 0, the deviation in frames."""
-    from scipy.ndimage import gaussian_filter1d
+    from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
+    if order == 0 and deviation > WIDE:
+        width = 2 * round(deviation) + 1  # three running means of it are as wide
+        for _ in range(3):
+            curve = uniform_filter1d(curve, width, axis=0, mode="nearest")
+        return np.asarray(curve)
     return np.asarray(gaussian_filter1d(curve, deviation, axis=0, order=order, mode="nearest"))
 
 

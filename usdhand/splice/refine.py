@@ -1,0 +1,84 @@
+"""Pass 2: the timing inside the phases, from how the wrist bends, the palm turns and the arm moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from usdhand.motion.rotations import Array
+from usdhand.splice.markers import Markers, shown_at
+from usdhand.splice.phases import Align, alike, smoothed
+from usdhand.splice.warps import EXACT, monotone, stiff
+
+# Standard deviations of Gaussians in seconds: of what is compared; of the mean that positions and
+# directions are compared around, as performers stand and reach differently; of the time over which
+# they move with the same amplitude; and of that over which they differ by as much.
+SMOOTHING_S, AROUND_S, AMPLITUDE_S, NOISE_S = 0.033, 1.0, 0.75, 0.33
+# Differences below these, in radians and cm, are no smaller noise.
+LEAST_ANGLE, LEAST_CM = np.radians(1.0), 0.05
+STIFFNESS = 300.0
+# Rounds of the linearised problem; more change the median error by less than 0.1 ms.
+ROUNDS = 4
+
+
+def refined(
+    body: Markers, hand: Markers, warp: Array, room: Array, align: Align, tether: float
+) -> Array:
+    """Warp (rows,) of pass 1 moved to where both hands are most alike, by a part of a frame.
+
+    The paper compares the angle between the palms with the forearms aligned, which is the one
+    between the forearms in the axes of the palms and needs no alignment. Where a wrist hardly
+    bends this says nothing, so that the palm's directions and the wrist's path have a say as well.
+    Each is weighed by how well it agrees there, and a warp is bent no more than this is worth:
+    what hardly changes, or differs anyway, has no say.
+
+    Parameters
+    ----------
+    room : (rows,) hand clip frames by which the warp may move, 0: not at all
+    tether : frames by which pass 1 is typically off
+    """
+    fps = body.fps
+    independent = 1.0 / (2.0 * np.sqrt(np.pi) * SMOOTHING_S * fps)  # smoothed noise, frame by frame
+    held = np.where(room > 0, 1.0 / tether**2, EXACT)
+    moved = np.zeros(len(body))
+    for _ in range(ROUNDS):
+        now = monotone(warp + moved)
+        pair = alike(body, shown_at(hand, now, fps), align)
+        slope = np.maximum(np.gradient(now), 0.1)[:, None]
+        information, pull = np.zeros(len(body)), np.zeros(len(body))
+        for ours, theirs, least in _compared(*pair):
+            rate, apart = np.gradient(ours, axis=0) / slope, ours - theirs
+            squares = np.mean(apart**2, axis=1)
+            usual = max(float(np.median(squares)), least**2)
+            noise = np.maximum(usual, smoothed(squares, NOISE_S * fps))
+            information += independent * np.sum(rate**2, axis=1) / noise
+            pull += independent * np.sum(rate * apart, axis=1) / noise
+        weights = information + held
+        wanted = (information * moved + pull) / weights
+        moved = np.clip(stiff(wanted, weights, STIFFNESS * (fps / 60.0) ** 4), -room, room)
+    return monotone(warp + moved)
+
+
+def _compared(body: Markers, hand: Markers) -> Iterator[tuple[Array, Array, float]]:
+    """Curves (rows, n) of both hands in the same axes and time, and differences that are noise."""
+    fps = body.fps
+
+    def around(curve: Array) -> Array:
+        return np.asarray(curve - smoothed(curve, AROUND_S * fps))
+
+    bends = (_unit(smoothed(m.forearm, SMOOTHING_S * fps)) for m in (body, hand))
+    yield *bends, LEAST_ANGLE
+    positions = [smoothed(m.positions, SMOOTHING_S * fps) for m in (body, hand)]
+    wrists = [p[:, :2].mean(axis=1) for p in positions]
+    palms = (_unit(p[:, [0, 3]] - w[:, None]) for p, w in zip(positions, wrists, strict=True))
+    ours, theirs = (around(p.reshape(len(p), -1)) for p in palms)
+    yield ours, theirs, LEAST_ANGLE
+    ours, theirs = (around(w) for w in wrists)
+    both = np.stack([np.sum(ours * theirs, axis=1), np.sum(theirs**2, axis=1)], axis=1)
+    both = np.maximum(smoothed(both, AMPLITUDE_S * fps), 1e-9)
+    yield ours, theirs * (both[:, :1] / both[:, 1:]), LEAST_CM
+
+
+def _unit(v: Array) -> Array:
+    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9))
