@@ -1,0 +1,1 @@
+"""FBX characters, read with the ufbx library."""

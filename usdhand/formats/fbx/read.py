@@ -1,0 +1,182 @@
+"""An FBX character read into a Clip: centimetres, seconds, Y up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from usdhand.errors import InputError
+from usdhand.formats.fbx.pose import bind_matrices, joint_locals, matrices, right_handed
+from usdhand.formats.fbx.scene import Sampled, Scene, load_scene
+from usdhand.formats.fbx.skeletons import Rig, find_rig, find_take, keyed_takes
+from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
+from usdhand.motion import rotations as rot
+from usdhand.motion.rotations import Array
+
+Y_UP_FROM_Z_UP: Array = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+
+
+def read_clip(
+    path: Path,
+    *,
+    skel: str | None = None,
+    animation: str | None = None,
+    cm_per_unit: float | None = None,
+    up: str | None = None,
+) -> Clip:
+    """Read the motion of one character.
+
+    Parameters
+    ----------
+    path : an .fbx file, binary or ASCII
+    skel : name of the skeleton where there are several
+    animation : name of the animation (stack, take) where several have keys
+    cm_per_unit : centimetres of one unit of the file, instead of what it says itself
+    up : "Y" or "Z", instead of what the file says
+
+    Returns
+    -------
+    Clip
+        sampled at the file's frame rate, with everything odd or guessed in ``problems``.
+
+    Raises
+    ------
+    InputError
+        if the file cannot be read, has no skeleton or no motion, or ufbx is missing.
+    UsageError
+        if there are several skeletons or animations and none is chosen.
+    """
+    scene = _meant(load_scene(path, animation), cm_per_unit, up)
+    take = find_take(scene, animation)
+    rig = find_rig(scene, skel, take)
+    sampled = scene.sampled
+    assert sampled is not None
+    if take.moved.isdisjoint(rig.nodes):
+        name = rig.name or rig.joints[0]
+        raise InputError(f"{path}: the animation '{take.name}' does not move '{name}'.")
+    local, odd = joint_locals(scene, rig.nodes, sampled.transforms)
+    skeleton = _skeleton(scene, rig)
+    origin = replace(
+        _origin(scene, rig),
+        animation_path=take.name,
+        time_codes_per_second=sampled.fps,
+        first_time_code=sampled.first,
+    )
+    problems = (
+        *rig.problems,
+        *_scene_problems(scene, rig),
+        *odd,
+        *_time_problems(scene, rig, sampled),
+    )
+    return Clip(
+        skeleton,
+        rot.make_continuous(local.rotations),
+        local.translations,
+        local.scales,
+        sampled.fps,
+        path.stem,
+        origin,
+        problems,
+    )
+
+
+def read_character(
+    path: Path,
+    *,
+    skel: str | None = None,
+    cm_per_unit: float | None = None,
+    up: str | None = None,
+) -> Clip:
+    """Read a character that may have no motion: a clip of one frame at its bind pose.
+
+    Raises the same errors as `read_clip`, except for what concerns its animations.
+    """
+    scene = _meant(load_scene(path), cm_per_unit, up)
+    rig = find_rig(scene, skel, scene.sampled.take if scene.sampled else None)
+    skeleton = _skeleton(scene, rig)
+    parents, bind = skeleton.parents, skeleton.bind
+    above = np.where((parents >= 0)[:, None, None], bind[parents], np.eye(4))
+    local = np.linalg.inv(above) @ bind
+    translations = local[None, :, :3, 3]
+    return Clip(
+        skeleton,
+        rot.from_matrix(local[None, :, :3, :3]),
+        translations,
+        np.ones_like(translations),
+        scene.sampled.fps if scene.sampled else 24.0,
+        path.stem,
+        _origin(scene, rig),
+        (*rig.problems, *_scene_problems(scene, rig)),
+    )
+
+
+def animation_names(path: Path) -> tuple[str, ...]:
+    """Names of the animations (stacks, takes) of a file that have keys.
+
+    Raises InputError if the file cannot be read.
+    """
+    return keyed_takes(load_scene(path))
+
+
+def _meant(scene: Scene, cm_per_unit: float | None, up: str | None) -> Scene:
+    """The scene with the units and axes that the user says."""
+    unit = scene.cm_per_unit if cm_per_unit is None else cm_per_unit
+    if not 1e-6 < unit < 1e9:
+        raise InputError(f"{scene.path}: one unit is {unit:g} cm, which cannot be meant.")
+    axes = scene.axes
+    if up is not None:
+        axes = Y_UP_FROM_Z_UP if up == "Z" else np.eye(3)
+    return right_handed(replace(scene, cm_per_unit=unit), axes)
+
+
+def _skeleton(scene: Scene, rig: Rig) -> Skeleton:
+    rest, _ = joint_locals(scene, rig.nodes, scene.rest)
+    return Skeleton(
+        rig.joints,
+        parents_from_paths(rig.joints),
+        bind_matrices(scene, rig.nodes, rest),
+        matrices(rest.rotations[0], rest.translations[0]),
+    )
+
+
+def _origin(scene: Scene, rig: Rig) -> Origin:
+    return Origin(
+        path=scene.path,
+        skeleton_path=rig.name,
+        cm_per_unit=scene.cm_per_unit,
+        up_axis="Z" if abs(scene.axes[1, 2]) > 0.5 else "Y",
+    )
+
+
+def _scene_problems(scene: Scene, rig: Rig) -> Iterator[Problem]:
+    if not scene.says_axes:
+        yield Problem("no-axes", "the file does not say which axis is up: Y is taken")
+    if scene.bind.keys().isdisjoint(rig.nodes):
+        message = "the file has no bind pose: the nodes' own transforms stand in for it"
+        yield Problem("missing-bind", message, severity="note")
+
+
+def _time_problems(scene: Scene, rig: Rig, sampled: Sampled) -> Iterator[Problem]:
+    take = sampled.take
+    still = sum(node not in take.moved for node in rig.nodes)
+    if still:
+        message = f"{still} joints are not animated and stay at rest"
+        yield Problem("fewer-joints", message, take.name, "note")
+    if take.by_keys:
+        message = (
+            f"the animation is said to last from {take.begin:g} to {take.end:g} s, but its keys "
+            f"from {take.first_key:g} to {take.last_key:g} s: the keys are followed"
+        )
+        yield Problem("take-span", message, take.name)
+    if not scene.says_rate:
+        message = f"the file does not say its frame rate: {sampled.fps:g} is taken from its keys"
+        yield Problem("guessed-fps", message, take.name)
+    elif take.key_spacing > 0 and take.key_spacing * sampled.fps < 0.75:
+        message = (
+            f"keys are {1 / take.key_spacing:.4g} a second, but the file plays {sampled.fps:g} "
+            "frames a second: keys between frames are passed over"
+        )
+        yield Problem("dense-keys", message, take.name)

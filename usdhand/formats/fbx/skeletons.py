@@ -1,0 +1,171 @@
+"""Which nodes of an FBX scene are joints, what they are called, and which belong together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from usdhand.errors import InputError, UsageError
+from usdhand.formats.fbx.scene import Scene, Take
+from usdhand.motion import Problem
+
+LIMBS = 3  # joints that a chain needs to be a limb
+
+
+@dataclass(frozen=True)
+class Rig:
+    """One skeleton of a scene: a name for it, its joints as nodes and as full paths.
+
+    Joints come depth first, as in the file. ``name`` is "" where it is the only one.
+    """
+
+    name: str
+    nodes: tuple[int, ...]
+    joints: tuple[str, ...]
+    problems: tuple[Problem, ...] = ()
+
+
+def find_rig(scene: Scene, skel: str | None, take: Take | None) -> Rig:
+    """Return the skeleton of this name, or the only one, or the only one that can be meant.
+
+    Of several, those that the take moves are preferred, then those that have limbs.
+
+    Raises
+    ------
+    InputError
+        if there are no joints.
+    UsageError
+        if there are several skeletons and none is chosen, or not this one.
+    """
+    joints, problems = _joint_nodes(scene, take)
+    rigs = [_rig(scene, nodes, joints) for nodes in _groups(scene, joints)]
+    names = unique(rig.name for rig in rigs)
+    rigs = [Rig(name, r.nodes, r.joints, problems) for name, r in zip(names, rigs, strict=True)]
+    if skel is not None:
+        chosen = [r for r in rigs if skel == r.name] or [r for r in rigs if skel in r.joints]
+        if len(chosen) != 1:
+            raise UsageError(f"{scene.path}: no skeleton '{skel}'. There is {_listed(names)}.")
+    else:
+        chosen = _likely(rigs, take)
+        if len(chosen) > 1:
+            listed = _listed([r.name for r in chosen])
+            raise UsageError(f"{scene.path} has several skeletons, choose one of {listed}: --skel")
+    [rig] = chosen
+    return rig if len(rigs) > 1 else Rig("", rig.nodes, rig.joints, rig.problems)
+
+
+def find_take(scene: Scene, animation: str | None) -> Take:
+    """Return the take of this name, or the only one with keys.
+
+    Raises
+    ------
+    InputError
+        if nothing is animated.
+    UsageError
+        if there are several and none is chosen, or not this one.
+    """
+    names = keyed_takes(scene)
+    if not names:
+        raise InputError(f"{scene.path}: nothing is animated.")
+    if animation is None and len(names) > 1:
+        raise UsageError(
+            f"{scene.path} has several animations, choose one of {_listed(names)}: --animation"
+        )
+    if animation is not None and animation not in names:
+        raise UsageError(f"{scene.path}: no animation '{animation}'. There is {_listed(names)}.")
+    if scene.sampled is None:
+        raise InputError(f"{scene.path}: two animations are called '{animation}'. Rename one.")
+    return scene.sampled.take
+
+
+def keyed_takes(scene: Scene) -> tuple[str, ...]:
+    """Names of the takes that have keys."""
+    return tuple(take.name for take in scene.takes if take.moved)
+
+
+def unique(names: Iterable[str]) -> list[str]:
+    """The same names, numbered from the second on where one comes again."""
+    found: list[str] = []
+    taken = set[str]()
+    counts = Counter[str]()
+    for name in names:
+        fresh = name
+        while fresh in taken:
+            counts[name] += 1
+            fresh = f"{name}_{counts[name]}"
+        taken.add(fresh)
+        found.append(fresh)
+    return found
+
+
+def _joint_nodes(scene: Scene, take: Take | None) -> tuple[frozenset[int], tuple[Problem, ...]]:
+    """Limbs, bones of skins and what lies between; without any, all nulls that move."""
+    bones = {i for i, kind in enumerate(scene.kinds) if kind == "BONE"} | scene.skinned
+    problems: tuple[Problem, ...] = ()
+    if not bones:
+        nulls = {i for i, k in enumerate(scene.kinds) if k in ("EMPTY", "UNKNOWN") and i}
+        bones = nulls & (take.moved if take else nulls)
+        message = "the file has no limb nodes: its null objects are read as joints"
+        problems = (Problem("no-limbs", message, severity="note"),)
+    bones.discard(0)
+    if not bones:
+        raise InputError(f"{scene.path}: the file has no skeleton.")
+    between = set[int]()
+    for bone in bones:
+        line = []
+        node = int(scene.parents[bone])
+        while node > 0 and node not in bones and node not in between:
+            line.append(node)
+            node = int(scene.parents[node])
+        if node > 0:
+            between.update(line)
+    return frozenset(bones | between), problems
+
+
+def _groups(scene: Scene, joints: frozenset[int]) -> list[list[int]]:
+    """Roots that belong together: those under one null; what stands free stands alone."""
+    groups: dict[int, list[int]] = {}
+    for node in sorted(joints):
+        above = int(scene.parents[node])
+        if above not in joints:
+            groups.setdefault(above if above > 0 else -node, []).append(node)
+    return list(groups.values())
+
+
+def _rig(scene: Scene, roots: Sequence[int], joints: frozenset[int]) -> Rig:
+    children: dict[int, list[int]] = {}
+    for node in sorted(joints):
+        children.setdefault(int(scene.parents[node]), []).append(node)
+    nodes: list[int] = []
+    paths: list[str] = []
+    above = int(scene.parents[roots[0]])
+    waiting = _named(scene, roots, "")
+    while waiting:
+        node, path = waiting.pop()
+        nodes.append(node)
+        paths.append(path)
+        waiting += _named(scene, children.get(node, []), path + "/")
+    name = scene.names[above] if above > 0 else paths[0]
+    return Rig(name or "skeleton", tuple(nodes), tuple(paths))
+
+
+def _named(scene: Scene, nodes: Sequence[int], prefix: str) -> list[tuple[int, str]]:
+    """Nodes and paths, the last first."""
+    names = unique(scene.names[node].replace("/", "_") or "unnamed" for node in nodes)
+    return [(n, prefix + name) for n, name in zip(nodes, names, strict=True)][::-1]
+
+
+def _likely(rigs: list[Rig], take: Take | None) -> list[Rig]:
+    """Rigs that may be meant: each preference holds only while some rig fulfils it."""
+    preferences: list[Callable[[Rig], bool]] = [lambda rig: len(rig.nodes) >= LIMBS]
+    if take is not None:
+        moved = take.moved
+        preferences.insert(0, lambda rig: not moved.isdisjoint(rig.nodes))
+    for preferred in preferences:
+        rigs = [rig for rig in rigs if preferred(rig)] or rigs
+    return rigs
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names)

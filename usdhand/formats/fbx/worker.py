@@ -1,0 +1,203 @@
+"""What the ufbx library says of one FBX file, as JSON and numbers on standard output.
+
+usage: python -I -S worker.py FOLDER_OF_UFBX FILE.fbx ANIMATION|"" BYTES_OF_MEMORY
+
+Runs in a process of its own, because a damaged file can crash a C library, and because the
+bindings (0.0.5) count references wrongly: an element that is asked for twice is freed while it is
+in use. So every element that is asked for is held for good, nothing is collected, and the process
+ends without tidying up. Only ufbx and the standard library are imported here.
+"""
+
+from __future__ import annotations
+
+import array
+import gc
+import importlib
+import json
+import os
+import sys
+from collections.abc import Iterable
+from itertools import pairwise
+from statistics import median
+from typing import Any
+
+MAX_FRAMES = 200_000  # nearly an hour at 60 fps
+BLANK_FACTOR = 10.0  # a take that lasts this many times longer than its keys is not meant
+HELD: list[list[Any]] = []
+
+
+def held(items: Iterable[Any]) -> list[Any]:
+    """Elements of a ufbx list, never to be freed."""
+    found = list(items)
+    HELD.append(found)
+    return found
+
+
+def main(library: str, path: str, animation: str, memory: str) -> None:
+    """Describe a file; sample the chosen animation, or the only one that has keys."""
+    _limit(int(memory))
+    sys.path.append(library)
+    ufbx: Any = importlib.import_module("ufbx")
+    with open(path, "rb") as file:  # noqa: PTH123  (pathlib takes time to import)
+        data = file.read()
+    try:
+        scene = ufbx.load_memory(
+            data,
+            file_format=ufbx.FileFormat.FBX,
+            ignore_embedded=True,
+            skip_skin_vertices=True,
+            skip_mesh_parts=True,
+        )
+    except (ufbx.UfbxError, ValueError) as error:
+        return _answer({"error": str(error)})
+    nodes = held(scene.nodes)
+    index = {node.element_id: i for i, node in enumerate(nodes)}
+    stacks = held(scene.anim_stacks)
+    described = [_stack(stack, index) for stack in stacks]
+    wanted = [i for i, s in enumerate(described) if s["moved"] and animation in ("", s["name"])]
+    settings = scene.settings
+    says_rate = settings.time_mode.name != "DEFAULT" and 0.1 <= settings.frames_per_second <= 1e4
+    header = {
+        "unit_meters": settings.unit_meters,
+        "axes": [int(axis) for axis in settings.axes],
+        "says_rate": says_rate,
+        "nodes": [_node(node, index) for node in nodes],
+        "stacks": described,
+        **_bind(scene, index),
+    }
+    if len(wanted) != 1:
+        return _answer(header)
+    [chosen] = wanted
+    fps = settings.frames_per_second if says_rate else _rate(described[chosen]["spacing"])
+    begin, count = _frames(described[chosen], fps)
+    header["sampled"] = {"stack": chosen, "fps": fps, "first": begin * fps, "count": count}
+    if not 0 < count <= MAX_FRAMES:
+        return _answer({"error": f"the keys span {count} frames; at most {MAX_FRAMES} are read"})
+    moved = [nodes[i] for i in described[chosen]["moved"]]
+    return _answer(header, _samples(ufbx, stacks[chosen], moved, header))
+
+
+def _limit(memory: int) -> None:
+    """Let a damaged file not take all memory, where the system knows limits."""
+    try:
+        import resource
+    except ImportError:
+        return
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    if hard == resource.RLIM_INFINITY or memory < hard:
+        resource.setrlimit(resource.RLIMIT_AS, (memory, hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _samples(ufbx: Any, stack: Any, nodes: list[Any], header: dict[str, Any]) -> array.array[float]:
+    """Translation, rotation and scale of each moved node at each frame: 10 numbers."""
+    anim, evaluate = stack.anim, ufbx.evaluate_transform
+    fps, first = header["sampled"]["fps"], header["sampled"]["first"]
+    values = array.array("d")
+    for frame in range(header["sampled"]["count"]):
+        time = (first + frame) / fps
+        for node in nodes:
+            place, turn, size = evaluate(anim, node, time)
+            values.extend((*place, *turn, *size))
+    return values
+
+
+def _node(node: Any, index: dict[int, int]) -> dict[str, Any]:
+    parent, scale_node = node.parent, node.inherit_scale_node
+    place, turn, size = node.local_transform
+    return {
+        "name": node.name,
+        "parent": -1 if parent is None else index[parent.element_id],
+        "kind": node.attrib_type.name,
+        "inherit": node.inherit_mode.name,
+        "scale_node": -1 if scale_node is None else index[scale_node.element_id],
+        "local": (*place, *turn, *size),
+    }
+
+
+def _stack(stack: Any, index: dict[int, int]) -> dict[str, Any]:
+    """Nodes that have keys, and when: of the curves on anything but their visibility."""
+    moved: set[int] = set()
+    first, last, longest = float("inf"), -float("inf"), None
+    for layer in held(stack.layers):
+        for prop in held(layer.anim_props):
+            node = index.get(prop.element.element_id)
+            if node is None or prop.prop_name.startswith("Visibility"):
+                continue
+            for curve in prop.anim_value.curves:
+                if curve is None or not len(curve.keyframes):
+                    continue
+                moved.add(node)
+                first, last = min(first, curve.min_time), max(last, curve.max_time)
+                if longest is None or len(curve.keyframes) > len(longest.keyframes):
+                    longest = curve
+    return {
+        "name": stack.name,
+        "begin": stack.time_begin,
+        "end": stack.time_end,
+        "first": first,
+        "last": last,
+        "spacing": _spacing(longest),
+        "moved": sorted(moved),
+    }
+
+
+def _spacing(curve: Any) -> float:
+    """Usual distance of two keys, seconds; 0 if there are no two."""
+    times = [] if curve is None else [key.time for key in held(curve.keyframes)]
+    steps = [b - a for a, b in pairwise(times)]
+    return median(steps) if steps else 0.0
+
+
+def _rate(spacing: float) -> float:
+    """Frames a second that keys at this distance mean."""
+    return round(1.0 / spacing, 3) if spacing > 1e-4 else 30.0
+
+
+def _frames(stack: dict[str, Any], fps: float) -> tuple[float, int]:
+    """Start in seconds and number of frames: the take's own span, the keys' if that is not meant.
+
+    Sets ``by_keys`` in ``stack`` where the keys decide.
+    """
+    begin, end, first, last = (stack[k] for k in ("begin", "end", "first", "last"))
+    keyed = max(last - first, 1.0)
+    stack["by_keys"] = not (begin < end and begin <= last and end >= first) or (
+        end - begin > BLANK_FACTOR * keyed
+    )
+    if stack["by_keys"]:
+        begin, end = first, last
+    start = round(begin * fps) / fps
+    if abs(start - begin) * fps > 1e-3:
+        start = begin
+    frames = (end - start) * fps
+    return start, int(frames + 1e-3) + 1 if frames < 1e12 else sys.maxsize
+
+
+def _bind(scene: Any, index: dict[int, int]) -> dict[str, Any]:
+    """World matrices of the bind pose, by node: of skin clusters and of pose objects."""
+    clusters: dict[int, list[Any]] = {}
+    for cluster in held(scene.skin_clusters):
+        if cluster.bone_node is not None:
+            clusters.setdefault(index[cluster.bone_node.element_id], _flat(cluster.bind_to_world))
+    posed: dict[int, list[Any]] = {}
+    for pose in held(scene.poses):
+        for bone in held(pose.bone_poses) if pose.is_bind_pose else ():
+            posed.setdefault(index[bone.bone_node.element_id], _flat(bone.bone_to_world))
+    return {"clusters": list(clusters.items()), "poses": list(posed.items())}
+
+
+def _flat(matrix: Any) -> list[float]:
+    return [number for column in matrix for number in column]
+
+
+def _answer(header: dict[str, Any], values: array.array[float] | None = None) -> None:
+    out = sys.stdout.buffer
+    out.write(json.dumps(header).encode() + b"\n")
+    out.write(b"" if values is None else values.tobytes())
+    out.flush()
+
+
+if __name__ == "__main__":
+    gc.disable()
+    main(*sys.argv[1:])
+    os._exit(0)
