@@ -238,8 +238,10 @@ def _digits(points: Array, wrist: int, chains: Sequence[Chain]) -> tuple[_Digits
     _, spread, axes = np.linalg.svd(roots - middle)
     if len(roots) > 2 and spread[1] > 0.6 * spread[0]:
         return {}, "the chains start on a ring, not in a row"
-    places = (roots - middle) @ axes[0]
-    side = float((points[thumb_line[0]] - middle) @ axes[0])
+    along = unit(middle - points[wrist])
+    across = axes[0] - along * (axes[0] @ along)  # knuckles of the index finger lie farther out
+    places = (roots - middle) @ across
+    side = float((points[thumb_line[0]] - middle) @ across)
     if abs(side) < 0.1 * np.ptp(places):
         return {}, "the thumb starts at neither end of the row of fingers"
     order = np.argsort(-places * np.sign(side))
