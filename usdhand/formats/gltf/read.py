@@ -1,0 +1,227 @@
+"""A glTF, VRM or VRMA character read into a Clip: centimetres, seconds, Y up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usdhand.errors import InputError
+from usdhand.formats.gltf.characters import Character, find_character
+from usdhand.formats.gltf.curves import choose, moved_nodes, names_of, read_curves
+from usdhand.formats.gltf.document import Document, read_document
+from usdhand.formats.gltf.nodes import Tree, matrices, read_tree
+from usdhand.formats.gltf.placement import Motion, Space, find_placement, placed, sampled
+from usdhand.formats.gltf.poses import bind_matrices
+from usdhand.formats.gltf.timing import DEFAULT_FPS, Timing, find_timing
+from usdhand.formats.gltf.vrm import Humanoid, read_humanoid
+from usdhand.motion import Clip, Origin, Problem, Skeleton
+from usdhand.motion import rotations as rot
+from usdhand.motion.rotations import Array
+
+CM_PER_UNIT = 100.0
+Y_UP_FROM_Z_UP: Array = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+MOST_VALUES = 20_000_000  # frames times joints: 55 minutes of 100 joints at 60 fps
+MOST_PATH_LETTERS = 20_000_000
+
+
+def read_clip(
+    path: Path,
+    *,
+    skel: str | None = None,
+    animation: str | None = None,
+    cm_per_unit: float | None = None,
+    up: str | None = None,
+) -> Clip:
+    """Read the motion of one character.
+
+    Parameters
+    ----------
+    path : a .glb, .gltf, .vrm or .vrma file
+    skel : name of the skeleton where there are several
+    animation : name of the animation where there are several
+    cm_per_unit : centimetres of one unit; metres by default, as glTF says
+    up : "Y" or "Z"; "Y" by default, as glTF says
+
+    Raises
+    ------
+    InputError
+        if the file is damaged or has no character or animation.
+    UsageError
+        if there are several and none is chosen.
+    """
+    with np.errstate(all="ignore"):  # whatever is no number is refused by name
+        scene = _scene(path, skel)
+        return _animated(scene, choose(scene.document, animation), cm_per_unit, up)
+
+
+def read_character(
+    path: Path, *, skel: str | None = None, cm_per_unit: float | None = None, up: str | None = None
+) -> Clip:
+    """Read a character that may have no motion: a clip of one frame at its bind pose.
+
+    Raises the same errors as `read_clip`, except for a missing animation.
+    """
+    with np.errstate(all="ignore"):
+        return _still(_scene(path, skel), cm_per_unit, up)
+
+
+def animation_names(path: Path) -> tuple[str, ...]:
+    """Names of the animations that move nodes, as ``animation`` takes them.
+
+    Raises
+    ------
+    InputError
+        if the file is damaged.
+    """
+    return tuple(names_of(read_document(path)).values())
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """A file and the character chosen in it."""
+
+    document: Document
+    tree: Tree
+    humanoid: Humanoid
+    character: Character
+
+    @property
+    def nodes(self) -> list[int]:
+        return list(self.character.nodes)
+
+    @property
+    def parents(self) -> NDArray[np.intp]:
+        place = {node: joint for joint, node in enumerate(self.nodes)}
+        above = [place.get(int(self.tree.parents[node]), -1) for node in self.nodes]
+        return np.array(above, dtype=np.intp)
+
+
+def _scene(path: Path, skel: str | None) -> _Scene:
+    document = read_document(path)
+    tree, humanoid = read_tree(document), read_humanoid(document)
+    moving: set[int] = set().union(*moved_nodes(document).values())
+    return _Scene(document, tree, humanoid, find_character(document, tree, humanoid, moving, skel))
+
+
+def _animated(scene: _Scene, number: int, cm: float | None, up: str | None) -> Clip:
+    document, tree, nodes = scene.document, scene.tree, scene.nodes
+    parents = scene.parents
+    above = {node for joint in np.flatnonzero(parents < 0) for node in tree.above(nodes[joint])}
+    name = names_of(document)[number]
+    curves, problems = read_curves(
+        document, document.lists["animations"][number], above | set(nodes)
+    )
+    if not curves:
+        raise InputError(
+            f"{document.path}: the animation '{name}' moves none of the {len(nodes)} joints of "
+            f"'{scene.character.names[0]}'."
+        )
+    timing = find_timing(str(document.path), [curve.times for curve in curves.values()])
+    if timing.count * len(nodes) > MOST_VALUES:
+        raise InputError(
+            f"{document.path}: {timing.count} frames of {len(nodes)} joints cannot be meant. "
+            "Check the key times."
+        )
+    motion = Motion(curves, timing)
+    q, t, s = sampled(tree, nodes, motion)
+    placement, found = find_placement(tree, nodes, parents, s, motion, _space(cm, up))
+    rotations, translations, scales = placed(q, t, s, parents, placement)
+    origin = replace(
+        _origin(scene, cm, up),
+        animation_path=name,
+        time_codes_per_second=timing.fps,
+        first_time_code=_first_frame(timing),
+    )
+    skeleton, missing = _skeleton(scene, cm, up)
+    guess = (Problem("guessed-fps", timing.guess, name, "note"),) if timing.guess else ()
+    return Clip(
+        skeleton,
+        rotations,
+        translations,
+        scales,
+        timing.fps,
+        document.path.stem,
+        origin,
+        tuple(dict.fromkeys((*problems, *found, *missing, *guess))),
+    )
+
+
+def _still(scene: _Scene, cm: float | None, up: str | None) -> Clip:
+    skeleton, problems = _skeleton(scene, cm, up)
+    parents = skeleton.parents
+    inverse = np.linalg.inv(skeleton.bind)
+    over = np.where((parents >= 0)[:, None, None], inverse[parents], np.eye(4))
+    local = over @ skeleton.bind
+    origin = replace(_origin(scene, cm, up), time_codes_per_second=DEFAULT_FPS)
+    return Clip(
+        skeleton,
+        rot.from_matrix(local[None, :, :3, :3]),
+        local[None, :, :3, 3].copy(),
+        np.ones((1, len(parents), 3)),
+        DEFAULT_FPS,
+        scene.document.path.stem,
+        origin,
+        problems,
+    )
+
+
+def _skeleton(
+    scene: _Scene, cm: float | None, up: str | None
+) -> tuple[Skeleton, tuple[Problem, ...]]:
+    """Joints with their bind pose, and as rest pose the default transforms of the nodes."""
+    tree, nodes, parents = scene.tree, scene.nodes, scene.parents
+    space, pose = _space(cm, up), Motion({})
+    q, t, s = sampled(tree, nodes, pose)
+    placement, odd = find_placement(tree, nodes, parents, s, pose, space)
+    q, t, _ = placed(q, t, s, parents, placement)
+    rest = matrices(t[0], q[0], np.ones_like(t[0]))
+    bind, problems = bind_matrices(scene.document, tree, scene.character, parents)
+    bind[:, :3] = space.axes @ bind[:, :3]
+    bind[:, :3, 3] *= space.unit
+    bones = scene.humanoid.bones
+    if bones:
+        message = f"{len(bones)} joints are named as bones of a {scene.humanoid.version} humanoid"
+        problems += (Problem("humanoid", message, severity="note"),)
+    aliases = tuple(bones.get(node, "") for node in nodes) if bones else ()
+    return Skeleton(_joint_paths(scene), parents, bind, rest, aliases), (*odd, *problems)
+
+
+def _space(cm: float | None, up: str | None) -> Space:
+    return Space(CM_PER_UNIT if cm is None else cm, Y_UP_FROM_Z_UP if up == "Z" else np.eye(3))
+
+
+def _joint_paths(scene: _Scene) -> tuple[str, ...]:
+    """Full paths of the joints; of siblings with one name the later ones get a number."""
+    paths: list[str] = []
+    taken: set[str] = set()
+    letters = 0
+    for node, parent in zip(scene.nodes, scene.parents, strict=True):
+        holder = f"{paths[parent]}/" if parent >= 0 else ""
+        path = whole = holder + scene.tree.name(node)
+        number = 1
+        while path in taken:
+            number += 1
+            path = f"{whole}_{number}"
+        taken.add(path)
+        paths.append(path)
+        letters += len(path)
+        if letters > MOST_PATH_LETTERS:
+            scene.tree.elements[node].refuse("has too long a name, or too many joints above it")
+    return tuple(paths)
+
+
+def _origin(scene: _Scene, cm: float | None, up: str | None) -> Origin:
+    return Origin(
+        path=scene.document.path,
+        skeleton_path="" if scene.character.alone else scene.character.names[0],
+        cm_per_unit=CM_PER_UNIT if cm is None else cm,
+        up_axis=up or "Y",
+    )
+
+
+def _first_frame(timing: Timing) -> float:
+    frame = timing.start * timing.fps
+    return float(round(frame)) if abs(frame - round(frame)) < 1e-2 else frame
