@@ -1,0 +1,1 @@
+"""BVH, the text format of motion capture: read into clips, written from clips."""

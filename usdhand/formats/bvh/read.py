@@ -1,0 +1,195 @@
+"""A BVH file read into a Clip: centimetres, seconds, Y up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from usdhand.errors import InputError, UsageError
+from usdhand.formats.bvh.file import BvhFile, parse_file
+from usdhand.formats.bvh.hierarchy import Hierarchy
+from usdhand.formats.bvh.motion import local_motion
+from usdhand.formats.bvh.pose import choose_bind, posed_skeleton
+from usdhand.formats.guess import Y_UP_FROM_Z_UP, guess_units, guess_up
+from usdhand.motion import Clip, Origin, Problem, forward_kinematics
+from usdhand.motion import rotations as rot
+from usdhand.motion.rotations import IDENTITY, Array
+
+LOOKED_AT = 40  # frames that the up axis is guessed from
+# Joints times frames that need as much memory as any motion; more only if most joints move.
+PLENTY = 10_000_000
+STILL_JOINTS = 4  # joints a channel, at most, beyond that
+NEAR_ZERO = 0.25  # of the OFFSET
+
+
+def read_clip(
+    path: Path,
+    *,
+    skel: str | None = None,
+    animation: str | None = None,
+    cm_per_unit: float | None = None,
+    up: str | None = None,
+) -> Clip:
+    """Read a BVH file.
+
+    The channels of a joint turn it in their order, the first outermost; its position channels stand
+    in place of its OFFSET. End Sites are joints named after the one that they end, ``Head_End``.
+    The bind pose is the one of all channels zero; where no body stands in that, the first frame in
+    which it does. What the file does not say is guessed, and said in ``problems``.
+
+    Parameters
+    ----------
+    skel : name of one of several ROOTs; without it, all together are one skeleton
+    animation : None or the file's stem, which is the name of its only animation
+    cm_per_unit, up : of the file, "Y" or "Z"; guessed if None
+
+    Raises
+    ------
+    InputError
+        if the file is damaged or has no motion, naming the line.
+    UsageError
+        if ``skel`` or ``animation`` is not in the file.
+    """
+    path = Path(path)
+    if animation not in (None, *animation_names(path)):
+        raise UsageError(f"{path} has one animation, '{path.stem}', and no '{animation}'.")
+    clip = _posed(path, skel, cm_per_unit, up)
+    if not len(clip):
+        raise InputError(f"{path} has no motion: it has no frames or no channels.")
+    return clip
+
+
+def read_character(
+    path: Path, *, skel: str | None = None, cm_per_unit: float | None = None, up: str | None = None
+) -> Clip:
+    """Read a BVH file that may have no motion: a clip of one frame at its bind pose.
+
+    Parameters and errors are those of `read_clip`.
+    """
+    clip = _posed(Path(path), skel, cm_per_unit, up)
+    rest = clip.skeleton.rest[None]
+    translations = rest[:, :, :3, 3].copy()
+    return replace(
+        clip,
+        rotations=rot.from_matrix(rest[:, :, :3, :3]),
+        translations=translations,
+        scales=np.ones_like(translations),
+    )
+
+
+def animation_names(path: Path) -> tuple[str, ...]:
+    """Names of the animations in a file: one, the file's stem."""
+    return (Path(path).stem,)
+
+
+def _posed(path: Path, skel: str | None, cm_per_unit: float | None, up: str | None) -> Clip:
+    """The motion, which may have no frames, with its bind pose."""
+    file = _chosen(parse_file(path), skel, path)
+    hierarchy, rows = file.hierarchy, file.rows
+    _check_size(path, hierarchy, len(rows))
+    rotations, translations = local_motion(hierarchy, rows)
+    problems = [*file.problems, *_channel_problems(hierarchy, translations)]
+    if cm_per_unit is None:
+        cm_per_unit, guessed = guess_units(hierarchy.offsets, hierarchy.parents, hierarchy.names)
+        problems.append(guessed)
+    zero = _zero_pose(hierarchy)
+    clip = replace(
+        zero,
+        rotations=rotations,
+        translations=translations,
+        scales=np.broadcast_to(1.0, translations.shape),
+        fps=file.fps,
+        name=path.stem,
+    )
+    if up is None:
+        up, guessed = guess_up([_positions(zero), _positions(clip)])
+        problems.append(guessed)
+    zero, clip = (_placed(c, cm_per_unit, up) for c in (zero, clip))
+    skeleton, odd = choose_bind(zero, clip)
+    origin = Origin(
+        path=path,
+        animation_path=path.stem,
+        time_codes_per_second=file.fps,
+        cm_per_unit=cm_per_unit,
+        up_axis=up,
+    )
+    return replace(clip, skeleton=skeleton, origin=origin, problems=(*problems, *odd))
+
+
+def _chosen(file: BvhFile, skel: str | None, path: Path) -> BvhFile:
+    """One of several ROOTs, if one is named."""
+    hierarchy = file.hierarchy
+    roots = [int(j) for j in np.flatnonzero(hierarchy.parents < 0)]
+    if skel is None or len(roots) == 1:
+        return file
+    named = [j for j in roots if hierarchy.joints[j] == skel]
+    if not named:
+        names = ", ".join(hierarchy.joints[j] for j in roots)
+        raise UsageError(f"{path} has no ROOT '{skel}'; it has {names}.")
+    part, columns = hierarchy.below(named[0])
+    return replace(file, hierarchy=part, rows=file.rows[:, columns])
+
+
+def _check_size(path: Path, hierarchy: Hierarchy, frames: int) -> None:
+    joints = len(hierarchy.joints)
+    if joints * frames > PLENTY and joints > STILL_JOINTS * hierarchy.width:
+        raise InputError(
+            f"{path}: {joints} joints with {hierarchy.width} channels in {frames} frames cannot be "
+            "meant."
+        )
+
+
+def _zero_pose(hierarchy: Hierarchy) -> Clip:
+    """One frame, all channels zero; positions are the OFFSETs."""
+    q = np.tile(IDENTITY, (1, len(hierarchy.joints), 1))
+    t = hierarchy.offsets[None]
+    skeleton = posed_skeleton(hierarchy.joints, hierarchy.parents, q[0], t[0])
+    return Clip(skeleton, q, t, np.ones_like(t), 1.0)
+
+
+def _positions(clip: Clip) -> Array:
+    """World positions of all joints at some frames spread over a clip."""
+    if not len(clip):
+        return np.empty((0, len(clip.skeleton), 3))
+    frames = np.unique(np.linspace(0, len(clip) - 1, LOOKED_AT).astype(int))
+    some = replace(
+        clip,
+        rotations=clip.rotations[frames],
+        translations=clip.translations[frames],
+        scales=clip.scales[frames],
+    )
+    return forward_kinematics(some).positions
+
+
+def _placed(clip: Clip, cm_per_unit: float, up: str) -> Clip:
+    """In centimetres and Y up: what turns the axes is part of the roots' rotations."""
+    translations = clip.translations * cm_per_unit
+    if up == "Y":
+        return replace(clip, translations=translations)
+    roots = clip.skeleton.parents < 0
+    axes = rot.from_matrix(Y_UP_FROM_Z_UP)
+    rotations = clip.rotations.copy()
+    rotations[:, roots] = rot.make_continuous(rot.multiply(axes, rotations[:, roots]))
+    translations[:, roots] = rot.rotate(axes, translations[:, roots])
+    return replace(clip, rotations=rotations, translations=translations)
+
+
+def _channel_problems(hierarchy: Hierarchy, translations: Array) -> Iterator[Problem]:
+    kinds = [{kind for kind, _ in channels} for channels in hierarchy.channels]
+    scaled = [name for name, own in zip(hierarchy.names, kinds, strict=True) if "scale" in own]
+    if scaled:
+        message = f"{len(scaled)} joints have scale channels, e.g. '{scaled[0]}': not read"
+        yield Problem("scale-channels", message)
+    offsets = np.linalg.norm(hierarchy.offsets, axis=-1)
+    for joint, own in enumerate(kinds):
+        if "position" in own and len(translations):
+            usual = float(np.median(np.linalg.norm(translations[:, joint], axis=-1)))
+            if usual < NEAR_ZERO * offsets[joint]:
+                message = (
+                    "the positions stay near zero, far from the OFFSET that they replace: the "
+                    "program that wrote them may have meant them to be added to it"
+                )
+                yield Problem("near-zero-positions", message, hierarchy.joints[joint])
