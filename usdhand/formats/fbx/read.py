@@ -16,6 +16,7 @@ from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
+DEFAULT_FPS = 30.0  # what FBX programs play a file at that does not say
 Y_UP_FROM_Z_UP: Array = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
@@ -50,10 +51,9 @@ def read_clip(
         if there are several skeletons or animations and none is chosen.
     """
     scene = _meant(load_scene(path, animation), cm_per_unit, up)
-    take = find_take(scene, animation)
-    rig = find_rig(scene, skel, take)
-    sampled = scene.sampled
-    assert sampled is not None
+    sampled = find_take(scene, animation)
+    take = sampled.take
+    rig = find_rig(scene, skel, take.moved)
     if take.moved.isdisjoint(rig.nodes):
         name = rig.name or rig.joints[0]
         raise InputError(f"{path}: the animation '{take.name}' does not move '{name}'.")
@@ -94,21 +94,22 @@ def read_character(
 
     Raises the same errors as `read_clip`, except for what concerns its animations.
     """
-    scene = _meant(load_scene(path), cm_per_unit, up)
-    rig = find_rig(scene, skel, scene.sampled.take if scene.sampled else None)
+    scene = _meant(load_scene(path, sample=False), cm_per_unit, up)
+    rig = find_rig(scene, skel, frozenset().union(*(take.moved for take in scene.takes)))
     skeleton = _skeleton(scene, rig)
     parents, bind = skeleton.parents, skeleton.bind
     above = np.where((parents >= 0)[:, None, None], bind[parents], np.eye(4))
     local = np.linalg.inv(above) @ bind
     translations = local[None, :, :3, 3]
+    origin = _origin(scene, rig)
     return Clip(
         skeleton,
         rot.from_matrix(local[None, :, :3, :3]),
         translations,
         np.ones_like(translations),
-        scene.sampled.fps if scene.sampled else 24.0,
+        origin.time_codes_per_second,
         path.stem,
-        _origin(scene, rig),
+        origin,
         (*rig.problems, *_scene_problems(scene, rig)),
     )
 
@@ -118,7 +119,7 @@ def animation_names(path: Path) -> tuple[str, ...]:
 
     Raises InputError if the file cannot be read.
     """
-    return keyed_takes(load_scene(path))
+    return keyed_takes(load_scene(path, sample=False))
 
 
 def _meant(scene: Scene, cm_per_unit: float | None, up: str | None) -> Scene:
@@ -146,6 +147,7 @@ def _origin(scene: Scene, rig: Rig) -> Origin:
     return Origin(
         path=scene.path,
         skeleton_path=rig.name,
+        time_codes_per_second=scene.fps or DEFAULT_FPS,
         cm_per_unit=scene.cm_per_unit,
         up_axis="Z" if abs(scene.axes[1, 2]) > 0.5 else "Y",
     )
@@ -171,7 +173,7 @@ def _time_problems(scene: Scene, rig: Rig, sampled: Sampled) -> Iterator[Problem
             f"from {take.first_key:g} to {take.last_key:g} s: the keys are followed"
         )
         yield Problem("take-span", message, take.name)
-    if not scene.says_rate:
+    if scene.fps is None:
         message = f"the file does not say its frame rate: {sampled.fps:g} is taken from its keys"
         yield Problem("guessed-fps", message, take.name)
     elif take.key_spacing > 0 and take.key_spacing * sampled.fps < 0.75:

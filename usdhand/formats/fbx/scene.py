@@ -75,7 +75,9 @@ class Scene:
     rest : transforms of one frame, the nodes' own defaults
     bind : world matrices (4, 4) of the bind pose, by node, for column vectors
     axes : (3, 3) turns the file's axes to X right, Y up, Z to the front
-    says_axes, says_rate : whether the file says its axes and frames a second
+    says_axes : whether the file says them
+    fps : frames a second, None if the file does not say
+    version : of the format, 7400 for 7.4
     """
 
     path: Path
@@ -92,11 +94,12 @@ class Scene:
     cm_per_unit: float
     axes: Array
     says_axes: bool
-    says_rate: bool
+    fps: float | None
+    version: int
 
 
-def load_scene(path: Path, animation: str | None = None) -> Scene:
-    """Read a file; sample the animation of this name, or the only one that has keys.
+def load_scene(path: Path, animation: str | None = None, *, sample: bool = True) -> Scene:
+    """Read a file; with ``sample``, sample the animation of this name, or the only one with keys.
 
     Raises
     ------
@@ -107,36 +110,42 @@ def load_scene(path: Path, animation: str | None = None) -> Scene:
         raise InputError(f"{path}: there is no such file.")
     if not path.stat().st_size:
         raise InputError(f"{path}: the file is empty.")
-    output = _run([str(library_folder()), str(path.resolve()), animation or ""], path)
+    request = {
+        "library": str(library_folder(path)),
+        "path": str(path.resolve()),
+        "sample": sample,
+        "animation": animation,
+        "memory": MEMORY_LIMIT + 10 * path.stat().st_size,
+    }
+    output = _run(request, path)
     header, _, numbers = output.partition(b"\n")
     said = json.loads(header)
     if "error" in said:
-        raise InputError(f"{path}: this is no FBX file that can be read ({said['error']}).")
+        raise InputError(f"{path}: cannot be read as FBX ({said['error']}).")
     return _scene(path, said, np.frombuffer(numbers))
 
 
-def library_folder() -> Path:
+def library_folder(path: Path) -> Path:
     """Folder that the ufbx bindings are installed in; InputError where they are not."""
     spec = importlib.util.find_spec("ufbx")
     folder = None if spec is None or spec.origin is None else Path(spec.origin).parent
     if folder is None:
-        raise InputError("FBX files are read with ufbx: pip install 'usdhand[convert]'")
+        raise InputError(
+            f"{path}: FBX files are read with the package ufbx: pip install 'usdhand[convert]'"
+        )
     if not any(folder.glob("_native*")):  # pyufbx calls its package ufbx too and has no animation
         raise InputError(
-            f"{folder} is not the ufbx package that reads FBX animation: "
-            "pip uninstall pyufbx; pip install 'usdhand[convert]'"
+            f"{path}: {folder} is not the package ufbx that reads animation: "
+            "pip uninstall pyufbx, then pip install --force-reinstall 'usdhand[convert]'"
         )
     return folder.parent
 
 
-def _run(arguments: list[str], path: Path) -> bytes:
-    damaged = f"{path}: this is no FBX file that can be read"
-    command = [sys.executable, "-I", "-S", str(WORKER), *arguments]
-    limit = str(MEMORY_LIMIT + 10 * path.stat().st_size)
+def _run(request: dict[str, Any], path: Path) -> bytes:
+    damaged = f"{path}: cannot be read as FBX"
+    command = [sys.executable, "-I", "-S", str(WORKER), json.dumps(request)]
     try:
-        done = subprocess.run(
-            [*command, limit], capture_output=True, check=False, timeout=TIME_LIMIT
-        )
+        done = subprocess.run(command, capture_output=True, check=False, timeout=TIME_LIMIT)
     except subprocess.TimeoutExpired:
         raise InputError(f"{damaged} (reading took more than {TIME_LIMIT:g} s).") from None
     if done.returncode < 0:
@@ -170,7 +179,8 @@ def _scene(path: Path, said: dict[str, Any], numbers: Array) -> Scene:
         cm_per_unit=100.0 * said["unit_meters"],
         axes=np.eye(3) if axes is None else axes,
         says_axes=axes is not None,
-        says_rate=said["says_rate"],
+        fps=said["fps"],
+        version=said["version"],
     )
 
 

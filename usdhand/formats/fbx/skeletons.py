@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from usdhand.errors import InputError, UsageError
-from usdhand.formats.fbx.scene import Scene, Take
+from usdhand.formats.fbx.scene import Sampled, Scene
 from usdhand.motion import Problem
 
 LIMBS = 3  # joints that a chain needs to be a limb
@@ -26,10 +26,10 @@ class Rig:
     problems: tuple[Problem, ...] = ()
 
 
-def find_rig(scene: Scene, skel: str | None, take: Take | None) -> Rig:
+def find_rig(scene: Scene, skel: str | None, moved: frozenset[int]) -> Rig:
     """Return the skeleton of this name, or the only one, or the only one that can be meant.
 
-    Of several, those that the take moves are preferred, then those that have limbs.
+    Of several, those with ``moved`` nodes are preferred, then those that have limbs.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def find_rig(scene: Scene, skel: str | None, take: Take | None) -> Rig:
     UsageError
         if there are several skeletons and none is chosen, or not this one.
     """
-    joints, problems = _joint_nodes(scene, take)
+    joints, problems = _joint_nodes(scene, moved)
     rigs = [_rig(scene, nodes, joints) for nodes in _groups(scene, joints)]
     names = unique(rig.name for rig in rigs)
     rigs = [Rig(name, r.nodes, r.joints, problems) for name, r in zip(names, rigs, strict=True)]
@@ -47,16 +47,16 @@ def find_rig(scene: Scene, skel: str | None, take: Take | None) -> Rig:
         if len(chosen) != 1:
             raise UsageError(f"{scene.path}: no skeleton '{skel}'. There is {_listed(names)}.")
     else:
-        chosen = _likely(rigs, take)
+        chosen = _likely(rigs, moved)
         if len(chosen) > 1:
             listed = _listed([r.name for r in chosen])
-            raise UsageError(f"{scene.path} has several skeletons, choose one of {listed}: --skel")
+            raise UsageError(f"{scene.path} has several skeletons: {listed}. Choose: --skel NAME")
     [rig] = chosen
     return rig if len(rigs) > 1 else Rig("", rig.nodes, rig.joints, rig.problems)
 
 
-def find_take(scene: Scene, animation: str | None) -> Take:
-    """Return the take of this name, or the only one with keys.
+def find_take(scene: Scene, animation: str | None) -> Sampled:
+    """Return the take of this name, or the only one with keys, sampled.
 
     Raises
     ------
@@ -67,16 +67,15 @@ def find_take(scene: Scene, animation: str | None) -> Take:
     """
     names = keyed_takes(scene)
     if not names:
-        raise InputError(f"{scene.path}: nothing is animated.")
+        raise InputError(f"{scene.path}: nothing is animated{_emptiness(scene)}.")
     if animation is None and len(names) > 1:
-        raise UsageError(
-            f"{scene.path} has several animations, choose one of {_listed(names)}: --animation"
-        )
+        listed = _listed(names)
+        raise UsageError(f"{scene.path} has several animations: {listed}. Choose: --animation NAME")
     if animation is not None and animation not in names:
         raise UsageError(f"{scene.path}: no animation '{animation}'. There is {_listed(names)}.")
     if scene.sampled is None:
         raise InputError(f"{scene.path}: two animations are called '{animation}'. Rename one.")
-    return scene.sampled.take
+    return scene.sampled
 
 
 def keyed_takes(scene: Scene) -> tuple[str, ...]:
@@ -99,18 +98,18 @@ def unique(names: Iterable[str]) -> list[str]:
     return found
 
 
-def _joint_nodes(scene: Scene, take: Take | None) -> tuple[frozenset[int], tuple[Problem, ...]]:
+def _joint_nodes(scene: Scene, moved: frozenset[int]) -> tuple[frozenset[int], tuple[Problem, ...]]:
     """Limbs, bones of skins and what lies between; without any, all nulls that move."""
     bones = {i for i, kind in enumerate(scene.kinds) if kind == "BONE"} | scene.skinned
     problems: tuple[Problem, ...] = ()
     if not bones:
         nulls = {i for i, k in enumerate(scene.kinds) if k in ("EMPTY", "UNKNOWN") and i}
-        bones = nulls & (take.moved if take else nulls)
+        bones = nulls & moved or nulls
         message = "the file has no limb nodes: its null objects are read as joints"
         problems = (Problem("no-limbs", message, severity="note"),)
     bones.discard(0)
     if not bones:
-        raise InputError(f"{scene.path}: the file has no skeleton.")
+        raise InputError(f"{scene.path}: there is no skeleton{_emptiness(scene)}.")
     between = set[int]()
     for bone in bones:
         line = []
@@ -156,16 +155,18 @@ def _named(scene: Scene, nodes: Sequence[int], prefix: str) -> list[tuple[int, s
     return [(n, prefix + name) for n, name in zip(nodes, names, strict=True)][::-1]
 
 
-def _likely(rigs: list[Rig], take: Take | None) -> list[Rig]:
+def _likely(rigs: list[Rig], moved: frozenset[int]) -> list[Rig]:
     """Rigs that may be meant: each preference holds only while some rig fulfils it."""
-    preferences: list[Callable[[Rig], bool]] = [lambda rig: len(rig.nodes) >= LIMBS]
-    if take is not None:
-        moved = take.moved
-        preferences.insert(0, lambda rig: not moved.isdisjoint(rig.nodes))
-    for preferred in preferences:
-        rigs = [rig for rig in rigs if preferred(rig)] or rigs
-    return rigs
+    rigs = [rig for rig in rigs if not moved.isdisjoint(rig.nodes)] or rigs
+    return [rig for rig in rigs if len(rig.nodes) >= LIMBS] or rigs
 
 
 def _listed(names: Sequence[str]) -> str:
     return ", ".join(f"'{name}'" for name in names)
+
+
+def _emptiness(scene: Scene) -> str:
+    """What to add where a file seems empty, which files of unknown versions do."""
+    if len(scene.names) > 1:
+        return ""
+    return f", for there is nothing in it that is known of FBX version {scene.version / 1000:g}"

@@ -1,6 +1,7 @@
 """What the ufbx library says of one FBX file, as JSON and numbers on standard output.
 
-usage: python -I -S worker.py FOLDER_OF_UFBX FILE.fbx ANIMATION|"" BYTES_OF_MEMORY
+usage: python -I -S worker.py '{"library": FOLDER_OF_UFBX, "path": FILE.fbx, "sample": true,
+    "animation": NAME or null, "memory": BYTES}'
 
 Runs in a process of its own, because a damaged file can crash a C library, and because the
 bindings (0.0.5) count references wrongly: an element that is asked for twice is freed while it is
@@ -33,12 +34,12 @@ def held(items: Iterable[Any]) -> list[Any]:
     return found
 
 
-def main(library: str, path: str, animation: str, memory: str) -> None:
+def main(request: dict[str, Any]) -> None:
     """Describe a file; sample the chosen animation, or the only one that has keys."""
-    _limit(int(memory))
-    sys.path.append(library)
+    _limit(request["memory"])
+    sys.path.append(request["library"])
     ufbx: Any = importlib.import_module("ufbx")
-    with open(path, "rb") as file:  # noqa: PTH123  (pathlib takes time to import)
+    with open(request["path"], "rb") as file:  # noqa: PTH123  (pathlib takes time to import)
         data = file.read()
     try:
         scene = ufbx.load_memory(
@@ -54,18 +55,21 @@ def main(library: str, path: str, animation: str, memory: str) -> None:
     index = {node.element_id: i for i, node in enumerate(nodes)}
     stacks = held(scene.anim_stacks)
     described = [_stack(stack, index) for stack in stacks]
-    wanted = [i for i, s in enumerate(described) if s["moved"] and animation in ("", s["name"])]
+    keyed = [i for i, stack in enumerate(described) if stack["moved"]]
+    name = request["animation"]
+    wanted = [i for i in keyed if name is None or name == described[i]["name"]]
     settings = scene.settings
     says_rate = settings.time_mode.name != "DEFAULT" and 0.1 <= settings.frames_per_second <= 1e4
     header = {
         "unit_meters": settings.unit_meters,
         "axes": [int(axis) for axis in settings.axes],
-        "says_rate": says_rate,
+        "version": scene.metadata.version,
+        "fps": settings.frames_per_second if says_rate else None,
         "nodes": [_node(node, index) for node in nodes],
         "stacks": described,
         **_bind(scene, index),
     }
-    if len(wanted) != 1:
+    if len(wanted) != 1 or not request["sample"]:
         return _answer(header)
     [chosen] = wanted
     fps = settings.frames_per_second if says_rate else _rate(described[chosen]["spacing"])
@@ -199,5 +203,5 @@ def _answer(header: dict[str, Any], values: array.array[float] | None = None) ->
 
 if __name__ == "__main__":
     gc.disable()
-    main(*sys.argv[1:])
+    main(json.loads(sys.argv[1]))
     os._exit(0)
