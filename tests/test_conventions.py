@@ -134,7 +134,7 @@ def test_a_users_convention_wins(tmp_path: Path) -> None:
     skeleton, _ = build(RIGS["humanik"])
     found = map_character(skeleton, load_conventions(written(tmp_path, text)))
     assert found.convention == "mine"
-    assert "ThumbCMC" in found.hands["left"].missing
+    assert "left Thumb by shape" in found.notes
 
 
 def test_a_users_table_replaces_one_of_the_same_name(tmp_path: Path) -> None:

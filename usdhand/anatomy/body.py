@@ -121,7 +121,8 @@ class Body:
 def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
     """Find chest, hips, neck and head from the wrists, and which way the character looks.
 
-    The chest is where both arms meet, the hips the spine joint nearest to where the legs start.
+    The chest is where both arms meet, or below that neck, the hips the spine joint nearest to where
+    the legs start.
     Up runs from the feet to the chest (Y without legs); the toes say what is in front.
     """
     up = np.array([0.0, 1.0, 0.0])
@@ -138,9 +139,15 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
         up = unit(tops - np.mean([points[leg[-1]] for leg in legs], axis=0))
         facing = _toe_direction(points, legs, up)
     arms = {a for w in wrists for a in (w, *skeleton.ancestors(w))}
+    shoulders = [points[c] for c in skeleton.children[chest] if c in arms]
+    if legs and float((np.mean(shoulders, axis=0) - points[chest]) @ up) < 0 and len(spine) > 2:
+        # The arms hang down from the neck, as in 3ds Max Biped.
+        joints |= {"neck": chest, "chest": spine[1]}
     above = [c for c in skeleton.children[chest] if c not in arms and heights[c] > 0]
     above = above or [c for c in skeleton.children[chest] if c not in arms]
-    if above:
+    if above and "neck" in joints:
+        joints["head"] = max(above, key=lambda c: float(points[c] @ up))
+    elif above:
         neck = max(above, key=lambda c: float(points[c] @ up))
         joints["neck"] = neck
         if skeleton.children[neck]:

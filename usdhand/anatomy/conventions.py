@@ -47,8 +47,10 @@ def name_key(name: str) -> str:
     """Spelling-free form of a joint name: letters and digits only, in lower case.
 
     Exporters turn separators into others or drop them, so ``hand.L``, ``hand_L`` and ``HandL``
-    are one name.
+    are one name. Maya writes them into FBX as codes: ``handFBXASC046L``.
     """
+    if "FBXASC" in name:
+        name = re.sub(r"FBXASC\d{3}", "", name)
     return "".join(filter(str.isalnum, name)).lower()
 
 

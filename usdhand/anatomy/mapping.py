@@ -16,8 +16,8 @@ from usdhand.anatomy.conventions import (
     load_conventions,
     named_side,
 )
-from usdhand.anatomy.hand import ARM_JOINTS, HAND_JOINTS, SIDES, CharacterMap, HandMap, Side
-from usdhand.anatomy.naming import ADVICE, Rig, is_hand, match_names
+from usdhand.anatomy.hand import ARM_JOINTS, DIGITS, HAND_JOINTS, SIDES, CharacterMap, HandMap, Side
+from usdhand.anatomy.naming import ADVICE, Rig, is_hand, match_names, named_body
 from usdhand.errors import HandNotFoundError
 from usdhand.motion.skeleton import Skeleton
 
@@ -25,8 +25,8 @@ from usdhand.motion.skeleton import Skeleton
 def map_character(skeleton: Skeleton, conventions: Conventions | None = None) -> CharacterMap:
     """Find the hands of a character, and the arm and body joints that go with them.
 
-    Joints that the user named one by one win; then the names of known conventions decide, then
-    the hierarchy and the bind pose.
+    Joints that the user named one by one win; then the names that the file gives its joints besides
+    their own (`Skeleton.aliases`), the names of known conventions, the hierarchy and the bind pose.
 
     Parameters
     ----------
@@ -42,13 +42,45 @@ def map_character(skeleton: Skeleton, conventions: Conventions | None = None) ->
     rig = Rig(skeleton)
     by_hand = conventions.explicit
     try:
-        found = match_names(rig, conventions) or _by_geometry(rig, conventions)
+        found = _found(rig, conventions)
     except HandNotFoundError as error:
         if not any(is_hand(by_hand.get(side, {})) for side in SIDES):
             raise
         found = CharacterMap({}, "map file", notes=(f"beyond the map file: {error}",))
     found = _with_explicit(rig, found, by_hand) if by_hand else found
     return _with_arms_and_body(rig, found)
+
+
+def _found(rig: Rig, conventions: Conventions) -> CharacterMap:
+    """Hands and body as far as names tell, or hands by their shape."""
+    aliased = Rig(rig.skeleton, aliased=True) if any(rig.skeleton.aliases) else None
+    if aliased and (found := match_names(aliased, conventions)):
+        return _with_unnamed_digits(rig, found)
+    if found := match_names(rig, conventions):
+        found = _with_unnamed_digits(rig, found)
+    else:
+        found = _by_geometry(rig, conventions)
+    return named_body(aliased, found, conventions) if aliased else found
+
+
+def _with_unnamed_digits(rig: Rig, found: CharacterMap) -> CharacterMap:
+    """Add digits of unknown names where the shape of the hand agrees with all names there are."""
+    if all(hand.digits == DIGITS for hand in found.hands.values()):
+        return found
+    shapes = {shape.wrist: shape for shape in geometry.find_hands(rig.skeleton, rig.points)[0]}
+    hands, notes = dict(found.hands), list(found.notes)
+    for side, hand in found.hands.items():
+        shape = shapes.get(hand.wrist)
+        if shape is None or not hand.joints.items() <= shape.joints.items():
+            continue
+        new = hands[side] = replace(
+            hand,
+            joints=shape.joints,
+            metacarpals={**shape.metacarpals, **hand.metacarpals},
+            tips={**shape.tips, **hand.tips},
+        )
+        notes += [f"{side} {d} by shape" for d in new.digits if d not in hand.digits]
+    return replace(found, hands=hands, notes=tuple(notes))
 
 
 # --- joints named by the user, arms, body ---------------------------------------------------------
@@ -129,7 +161,9 @@ def _with_arms_and_body(rig: Rig, found: CharacterMap) -> CharacterMap:
     notes = [f"{r} by hierarchy: {rig.path(j)}" for r, j in missing.items()]
     hands = {}
     for side, hand in found.hands.items():
-        arm = arm_joints(rig.skeleton, rig.points, hand.wrist, found.chest)
+        on_neck = found.neck in rig.skeleton.ancestors(hand.wrist)
+        trunk = found.neck if on_neck else found.chest
+        arm = arm_joints(rig.skeleton, rig.points, hand.wrist, trunk)
         used = {getattr(hand, r) for r in ARM_JOINTS}
         new: dict[str, Any] = {
             r: j for r, j in arm.items() if getattr(hand, r) is None and j not in used
@@ -147,8 +181,9 @@ def _by_geometry(rig: Rig, conventions: Conventions) -> CharacterMap:
     found, reasons = geometry.find_hands(rig.skeleton, rig.points)
     if not found:
         shapes = "; ".join(reasons[:3]) or "no joint has three to five chains of joints below it"
+        some = ", ".join(rig.skeleton.names[:3])
         raise HandNotFoundError(
-            f"no hand found in {len(rig.names)} joints ({', '.join(rig.names[:3])}, ...): no names "
+            f"no hand found in {len(rig.names)} joints ({some}, ...): no names "
             f"of the {len(conventions.conventions)} known conventions{_nearest_names(rig)}, and no "
             f"joint chain looks like a hand: {shapes}; {ADVICE}"
         )
@@ -225,6 +260,10 @@ def _sides(rig: Rig, found: Sequence[geometry.FoundHand]) -> tuple[list[Side], s
 
 
 def _named_side(rig: Rig, hand: geometry.FoundHand) -> Side | None:
-    """Side that the names of all the hand's joints agree on."""
+    """Side of the file's own name for the wrist or arm, else the one that all names agree on."""
+    if any(rig.skeleton.aliases):
+        for joint in (hand.wrist, *rig.skeleton.ancestors(hand.wrist)):
+            if side := named_side(rig.skeleton.aliases[joint]):
+                return side
     sides = {named_side(rig.path(j)) for j in (hand.wrist, *hand.joints.values())}
     return sides.pop() if len(sides) == 1 else None

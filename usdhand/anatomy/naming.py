@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from usdhand.anatomy.geometry import chirality
 from usdhand.anatomy.hand import (
     ARM_JOINTS,
     BODY_JOINTS,
+    DIGITS,
     FINGERS,
     HAND_JOINTS,
     SIDES,
@@ -44,13 +45,19 @@ ADVICE = "name the joints in a file and pass it with --map FILE"
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """A skeleton with what the search asks again and again."""
+    """A skeleton with what the search asks again and again.
+
+    ``aliased``: the joints' names are those that the file gives them besides their own.
+    """
 
     skeleton: Skeleton
+    aliased: bool = False
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Leaf names, without the running numbers that some exporters append to each joint."""
+        if self.aliased:
+            return self.skeleton.aliases
         names = self.skeleton.names
         numbers = [m.group() for n in names if (m := re.search(r"[._]\d+$", n))]
         if len(numbers) < 0.8 * len(names) or len(set(numbers)) < len(numbers):
@@ -67,7 +74,8 @@ class Rig:
         """Joints of each key, in the file's order."""
         found: dict[str, tuple[int, ...]] = {}
         for joint, key in enumerate(self.keys):
-            found[key] = (*found.get(key, ()), joint)
+            if key:
+                found[key] = (*found.get(key, ()), joint)
         return found
 
     @cached_property
@@ -105,6 +113,30 @@ def match_names(rig: Rig, conventions: Conventions) -> CharacterMap | None:
         if found := _character(rig, match, matches):
             return found
     return None
+
+
+def named_body(rig: Rig, found: CharacterMap, conventions: Conventions) -> CharacterMap:
+    """Put the arm and body joints with names of the best convention over what was found.
+
+    For names that are a file's own statement and need no hand to be believed: its aliases.
+    """
+    convention = max(conventions.conventions, key=lambda c: len(_exact(rig, c.body_keys)))
+    wrists = [h.wrist for h in found.hands.values()]
+    body: dict[str, Any] = _body(rig, _exact(rig, convention.body_keys), wrists)
+    hands = {}
+    for side, hand in found.hands.items():
+        roles = _exact(rig, convention.hand_keys.get(side, {}))
+        arms: dict[str, Any] = {r: roles[r][0] for r in ARM_JOINTS[:3] if r in roles}
+        hands[side] = replace(hand, **arms)
+    return replace(found, hands=hands, **body)
+
+
+def _exact(rig: Rig, names: Mapping[str, Sequence[str]]) -> Candidates:
+    """Joints with one of the names of each role, and nothing around it."""
+    found = {
+        role: tuple(j for k in keys for j in rig.by_key.get(k, ())) for role, keys in names.items()
+    }
+    return {role: joints for role, joints in found.items() if joints}
 
 
 def _matches(rig: Rig, convention: Convention) -> Iterator[_Match]:
@@ -181,7 +213,22 @@ def _rank(
         own_prefix,
         -len(prefix) - len(suffix),
         spelled,
+        sum(_thumb_starts_well(rig, roles) for roles in hands.values()),
     )
+
+
+def _thumb_starts_well(rig: Rig, roles: Candidates) -> bool:
+    """Whether the first joint of a thumb with joints missing lies where its name says.
+
+    VRM 0 calls the CMC what VRM 1 calls the MCP; of real hands the CMC lies at 0.25 to 0.48 of the
+    way from the wrist to the knuckles, the MCP beyond 0.7.
+    """
+    line = [r for r in ("ThumbCMC", "ThumbMCP", "ThumbIP") if r in roles]
+    if len(line) == 3 or not {"wrist", *line[:1]} <= set(roles) or line[:1] == ["ThumbIP"]:
+        return False
+    joints = [roles[r][0] for r in (*line[:1], *(f + "MCP" for f in FINGERS)) if r in roles]
+    thumb, *knuckles = np.linalg.norm(rig.points[joints] - rig.points[roles["wrist"][0]], axis=1)
+    return bool((thumb < 0.6 * np.mean(knuckles)) == (line[0] == "ThumbCMC")) if line else False
 
 
 def _character(rig: Rig, match: _Match, matches: Sequence[_Match]) -> CharacterMap | None:
@@ -200,6 +247,8 @@ def _character(rig: Rig, match: _Match, matches: Sequence[_Match]) -> CharacterM
         return None
     if len(hands) == 1:
         notes.append(f"only a {next(iter(hands))} hand was found")
+    if any(m.rank[:-1] == match.rank[:-1] and m.rank[-1] < match.rank[-1] for m in matches):
+        notes.append(f"names are those of {match.convention.name} by the place of the thumb")
     body = _body(rig, match.body, [h.wrist for h in hands.values()])
     return CharacterMap(hands, match.convention.name, **body, notes=tuple(notes))
 
@@ -236,6 +285,7 @@ def _hand(rig: Rig, side: Side, roles: Candidates, notes: list[str]) -> HandMap 
         elif role in HAND_JOINTS:
             _refuse(rig, f"{side} {role}", inside)
     _settle_thumb(rig, side, chosen, notes)
+    _fill_gaps(rig, side, chosen, notes)
     digits = {r: chosen[r] for r in HAND_JOINTS if r in chosen}
     metacarpals = {d: chosen[r] for d, r in METACARPALS.items() if r in chosen}
     tips = {d: tip for d in TIPS if (tip := _tip(rig, d, chosen)) is not None}
@@ -283,6 +333,18 @@ def _settle_thumb(rig: Rig, side: Side, chosen: dict[str, int], notes: list[str]
         notes.append(f"{side} thumb CMC by bone lengths: {rig.path(line[0])}")
 
 
+def _fill_gaps(rig: Rig, side: Side, chosen: dict[str, int], notes: list[str]) -> None:
+    """Take the one joint between the first and the third of a digit whose second has no name."""
+    for digit in DIGITS:
+        first, second, third = (digit + j for j in digit_joints(digit))
+        if first not in chosen or second in chosen or third not in chosen:
+            continue
+        between = rig.above[chosen[third]] - rig.above[chosen[first]] - {chosen[first]}
+        if len(between) == 1 and chosen[first] in rig.above[chosen[third]]:
+            chosen[second] = min(between)
+            notes.append(f"{side} {second} by hierarchy: {rig.path(chosen[second])}")
+
+
 _TIP_WORDS = ("end", "tip", "nub", "term")
 
 
@@ -292,7 +354,7 @@ def _tip(rig: Rig, digit: str, chosen: Mapping[str, int]) -> int | None:
         return chosen[TIPS[digit]]
     last = chosen.get(digit + digit_joints(digit)[-1])
     children = rig.skeleton.children[last] if last is not None else ()
-    ends = [c for c in children if any(w in rig.keys[c] for w in _TIP_WORDS)]
+    ends = [c for c in children if any(w in name_key(rig.skeleton.names[c]) for w in _TIP_WORDS)]
     return ends[0] if len(ends) == 1 and not rig.skeleton.children[ends[0]] else None
 
 
