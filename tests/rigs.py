@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from usdhand.anatomy.hand import DIGITS, FINGERS, SIDES, Side, digit_joints
+from usdhand.anatomy.hand import DIGITS, FINGERS, SIDES, CharacterMap, Side, digit_joints
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton, parents_from_paths
 
@@ -159,6 +159,33 @@ TIPS: tuple[str, ...] = tuple(d + "Tip" for d in DIGITS)
 
 _BODY = ("hips", "chest", "neck", "head")
 _ARM = ("clavicle", "shoulder", "elbow", "wrist")
+
+
+def found_joints(found: CharacterMap) -> dict[Joint, int]:
+    """All joints of a map with the names of tests.rigs."""
+    joints: dict[Joint, int | None] = {
+        (None, role): getattr(found, role) for role in ("hips", "chest", "neck", "head")
+    }
+    for side, hand in found.hands.items():
+        joints |= {
+            (side, role): getattr(hand, role) for role in ("clavicle", "shoulder", "elbow", "wrist")
+        }
+        joints |= {(side, role): joint for role, joint in hand.joints.items()}
+        joints |= {(side, d + "Metacarpal"): j for d, j in hand.metacarpals.items()}
+        joints |= {(side, d + "Tip"): j for d, j in hand.tips.items()}
+    return {key: joint for key, joint in joints.items() if joint is not None}
+
+
+def nonsense(drop: tuple[str, ...] = ()) -> dict[Joint, str]:
+    """Names that say nothing, for every joint but ``drop`` and the carpal bone."""
+    kept = (j for j in parents() if j[1] not in (*drop, "ThumbCarpal"))
+    return {joint: f"joint{i}" for i, joint in enumerate(kept)}
+
+
+def same_joints(found: CharacterMap, expected: dict[Joint, int]) -> None:
+    """Compare with everything that a map can hold."""
+    body = ("spine", "thigh", "shin", "foot", "toe", "toe_end", "ThumbCarpal")
+    assert found_joints(found) == {k: j for k, j in expected.items() if k[1] not in body}
 
 
 def known_rigs() -> dict[str, dict[Joint, str]]:

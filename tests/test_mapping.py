@@ -1,16 +1,15 @@
-"""Hands are found on every known rig, on unknown ones by their shape, and else refused."""
+"""Hands are found by the names of every known rig, or refused."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SHARED
 from hypothesis import given
 from hypothesis import strategies as st
 from rigs import (
@@ -20,13 +19,14 @@ from rigs import (
     Joint,
     Parents,
     build,
+    found_joints,
     from_points,
     known_rigs,
-    parents,
+    same_joints,
 )
 
 from usdhand.anatomy.conventions import load_conventions
-from usdhand.anatomy.hand import DIGITS, FINGERS, SIDES, CharacterMap, Side
+from usdhand.anatomy.hand import FINGERS, SIDES, Side
 from usdhand.anatomy.mapping import map_character
 from usdhand.errors import HandNotFoundError
 
@@ -47,36 +47,6 @@ RENAMES: dict[str, Rename] = {
     "separators dropped": lambda n: re.sub(r"[\W]", "", n),
     "upper case": str.upper,
 }
-
-
-def found_joints(found: CharacterMap) -> dict[Joint, int]:
-    """All joints of a map with the names of tests.rigs."""
-    joints: dict[Joint, int | None] = {
-        (None, role): getattr(found, role) for role in ("hips", "chest", "neck", "head")
-    }
-    for side, hand in found.hands.items():
-        joints |= {
-            (side, role): getattr(hand, role) for role in ("clavicle", "shoulder", "elbow", "wrist")
-        }
-        joints |= {(side, role): joint for role, joint in hand.joints.items()}
-        joints |= {(side, d + "Metacarpal"): j for d, j in hand.metacarpals.items()}
-        joints |= {(side, d + "Tip"): j for d, j in hand.tips.items()}
-    return {key: joint for key, joint in joints.items() if joint is not None}
-
-
-def nonsense(drop: tuple[str, ...] = ()) -> dict[Joint, str]:
-    """Names that say nothing, for every joint but ``drop`` and the carpal bone."""
-    kept = (j for j in parents() if j[1] not in (*drop, "ThumbCarpal"))
-    return {joint: f"joint{i}" for i, joint in enumerate(kept)}
-
-
-def same_joints(found: CharacterMap, expected: dict[Joint, int]) -> None:
-    """Compare with everything that a map can hold."""
-    body = ("spine", "thigh", "shin", "foot", "toe", "toe_end", "ThumbCarpal")
-    assert found_joints(found) == {k: j for k, j in expected.items() if k[1] not in body}
-
-
-# --- names ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("rename", RENAMES)
@@ -293,155 +263,6 @@ def test_arms_of_unknown_names_come_from_the_hierarchy() -> None:
     assert any("left elbow by hierarchy" in note for note in found.notes)
 
 
-# --- shape ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("drop", [(), TIPS, METACARPALS, (*TIPS, *METACARPALS)])
-@pytest.mark.parametrize("pose", ["T", "A"])
-@pytest.mark.parametrize("curl", [0.0, 4.0, 12.0, 30.0])
-def test_unknown_names(pose: str, curl: float, drop: tuple[str, ...]) -> None:
-    skeleton, expected = build(nonsense(drop), pose=pose, curl=curl)
-    found = map_character(skeleton)
-    assert found.convention == "geometry"
-    same_joints(found, expected)
-
-
-@given(
-    st.integers(0, 10_000),
-    st.sampled_from(["T", "A"]),
-    st.sampled_from([(), TIPS, METACARPALS, (*TIPS, *METACARPALS)]),
-)
-def test_unknown_names_of_hands_of_all_shapes(seed: int, pose: str, drop: tuple[str, ...]) -> None:
-    # Every joint somewhere within 3 mm of its place, the character of any size.
-    skeleton, expected = build(nonsense(drop), pose=pose)
-    random = np.random.default_rng(seed)
-    points = skeleton.bind_positions + random.uniform(-0.3, 0.3, (len(skeleton), 3))
-    size = random.uniform(0.05, 20.0)
-    same_joints(map_character(from_points(list(skeleton.joints), size * points)), expected)
-
-
-def test_unknown_names_with_twist_joints_in_the_arm() -> None:
-    skeleton, expected = build(nonsense())
-    renamed, points = [], list(skeleton.bind_positions)
-    elbow, wrist = (skeleton.joints[expected["left", r]] for r in ("elbow", "wrist"))
-    for joint in skeleton.joints:
-        renamed.append(joint.replace(wrist, f"{elbow}/twist/{wrist.rsplit('/', 1)[1]}"))
-    renamed.append(f"{elbow}/twist")
-    points.append((points[expected["left", "elbow"]] + points[expected["left", "wrist"]]) / 2)
-    same_joints(map_character(from_points(renamed, np.array(points))), expected)
-
-
-def test_unknown_names_of_a_character_that_looks_elsewhere() -> None:
-    skeleton, expected = build(nonsense())
-    for degrees in (90, 180, 237):
-        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-        turned = skeleton.bind_positions @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
-        same_joints(map_character(from_points(list(skeleton.joints), turned)), expected)
-
-
-def test_unknown_names_in_inches_and_lying_down() -> None:
-    skeleton, expected = build(nonsense())
-    points = skeleton.bind_positions[:, [0, 2, 1]] * [1, 1, -1] / 2.54
-    same_joints(map_character(from_points(list(skeleton.joints), points)), expected)
-
-
-def test_unknown_names_with_the_thumb_beside_the_wrist() -> None:
-    def move(parents: Parents) -> None:
-        for side in SIDES:
-            parents[side, "ThumbCMC"] = (side, "elbow")
-
-    skeleton, expected = build(nonsense(), move=move)
-    same_joints(map_character(skeleton), expected)
-
-
-def test_unknown_names_with_one_joint_for_all_fingers() -> None:
-    def move(parents: Parents) -> None:
-        for side in SIDES:
-            for finger in FINGERS:
-                parents[side, finger + "MCP"] = (side, "MiddleMetacarpal")
-
-    others = tuple(m for m in METACARPALS if m != "MiddleMetacarpal")
-    skeleton, expected = build(nonsense(others), move=move)
-    found = map_character(skeleton)
-    assert found.hands["left"].wrist == expected["left", "wrist"]
-    assert found.hands["left"].metacarpals == {}
-    assert found.hands["right"].joints == {r: expected["right", r] for r in HAND}
-
-
-def test_a_place_that_is_refused_is_noted() -> None:
-    skeleton, expected = build(nonsense())
-    points = skeleton.bind_positions.copy()
-    for thumb, finger in (("CMC", "MCP"), ("MCP", "PIP"), ("IP", "DIP"), ("Tip", "Tip")):
-        beside = points[expected["right", "Index" + finger]]
-        points[expected["right", "Thumb" + thumb]] = beside + np.array([0.0, -1.0, 0.0])
-    found = map_character(from_points(list(skeleton.joints), points))
-    assert tuple(found.hands) == ("left",)
-    assert any("only a left hand was found (below" in note for note in found.notes)
-
-
-def test_unknown_names_with_odd_parents() -> None:
-    # As in BEAT: the little finger under Ring, the thumb under Index.
-    def move(parents: Parents) -> None:
-        for side in SIDES:
-            parents[side, "ThumbCMC"] = (side, "IndexMetacarpal")
-            parents[side, "PinkyMetacarpal"] = (side, "RingMetacarpal")
-
-    skeleton, expected = build(nonsense(), move=move)
-    found = map_character(skeleton)
-    digits = {j: i for j, i in expected.items() if j[1] in HAND}
-    assert {j: i for j, i in found_joints(found).items() if j[1] in HAND} == digits
-
-
-def test_unknown_names_with_tips_left_at_the_origin() -> None:
-    skeleton, expected = build(nonsense())
-    points = skeleton.bind_positions.copy()
-    points[[i for j, i in expected.items() if j[1] in TIPS]] = 0.0
-    same_joints(map_character(from_points(list(skeleton.joints), points)), expected)
-
-
-@pytest.mark.parametrize("side", SIDES)
-def test_one_unknown_hand(side: Side) -> None:
-    named = {j: n for j, n in nonsense().items() if j[0] == side and j[1][0].isupper()}
-    skeleton, expected = build({**named, (side, "wrist"): "root"})
-    found = map_character(skeleton)
-    same_joints(found, expected)
-    assert any("only a" in note for note in found.notes)
-
-
-def test_words_tell_the_side_of_unknown_names() -> None:
-    named = {j: f"{n}_{j[0] or 'c'}" for j, n in nonsense().items()}
-    skeleton, expected = build(named)
-    mirrored = from_points(list(skeleton.joints), skeleton.bind_positions * [-1, 1, 1])
-    same_joints(map_character(mirrored), expected)
-
-
-def test_three_fingers_of_unknown_names() -> None:
-    gone = tuple("Pinky" + j for j in ("Metacarpal", "MCP", "PIP", "DIP", "Tip"))
-    skeleton, expected = build(nonsense(gone))
-    found = map_character(skeleton)
-    same_joints(found, expected)
-    assert any("from the thumb outwards" in note for note in found.notes)
-
-
-def test_toes_are_no_fingers() -> None:
-    skeleton, expected = build(nonsense())
-    joints, points = list(skeleton.joints), list(skeleton.bind_positions)
-    for side in SIDES:
-        foot = expected[side, "toe"]
-        for i in range(4):
-            path, place = joints[foot], points[foot]
-            for bone in range(3):
-                path += f"/t{i}{bone}"
-                joints.append(path)
-                points.append(place + np.array([(i - 1.5) * 1.5, 0, 1.5 + 1.5 * bone]))
-    found = map_character(from_points(joints, np.array(points)))
-    hands = {j: i for j, i in expected.items() if j[1] in HAND}
-    assert {j: i for j, i in found_joints(found).items() if j[1] in HAND} == hands
-
-
-# --- refusal -------------------------------------------------------------------------------------
-
-
 def test_cmu_is_refused() -> None:
     names = "Hips Chest LeftShoulder LeftArm LeftForeArm LeftHand LeftFingerBase LeftHandIndex1"
     joints = ["/".join(names.split()[: i + 1]) for i in range(8)]
@@ -450,48 +271,6 @@ def test_cmu_is_refused() -> None:
         map_character(from_points(joints, np.arange(27.0).reshape(9, 3)))
     assert error.value.exit_code == 4
     assert "--map FILE" in str(error.value)
-
-
-def test_body_without_fingers_is_refused() -> None:
-    named = {j: n for j, n in nonsense().items() if not j[1].startswith(DIGITS)}
-    skeleton, _ = build(named)
-    with pytest.raises(HandNotFoundError, match="no joint chain looks like a hand"):
-        map_character(skeleton)
-
-
-def test_digits_without_a_thumb_are_refused() -> None:
-    gone = tuple("Thumb" + j for j in ("CMC", "MCP", "IP", "Tip"))
-    skeleton, _ = build(nonsense(gone))
-    with pytest.raises(HandNotFoundError, match="thumb"):
-        map_character(skeleton)
-
-
-def test_nothing_to_tell_left_from_right_is_refused() -> None:
-    # No legs, flat hands, and thumbs that point to the sides.
-    gone = ("thigh", "shin", "foot", "toe", "toe_end")
-    skeleton, expected = build(nonsense(gone), curl=0.0)
-    points = skeleton.bind_positions.copy()
-    for (side, role), joint in expected.items():
-        if side and role in (*HAND, *METACARPALS, *TIPS):
-            wrist, sign = points[expected[side, "wrist"]], 1 if side == "left" else -1
-            along, _, across = (points[joint] - wrist) * [sign, 1, 1]
-            points[joint] = wrist + np.array([sign * across, -along, 0])
-    with pytest.raises(HandNotFoundError, match="nothing tells left from right"):
-        map_character(from_points(list(skeleton.joints), points))
-
-
-def test_no_joints_at_all() -> None:
-    with pytest.raises(HandNotFoundError):
-        map_character(from_points(["root"], np.zeros((1, 3))))
-
-
-def test_no_usable_bind_pose() -> None:
-    skeleton, expected = build(nonsense())
-    nowhere = from_points(list(skeleton.joints), skeleton.bind_positions * 0)
-    with pytest.raises(HandNotFoundError):
-        map_character(nowhere)
-    by_rest = type(skeleton)(skeleton.joints, skeleton.parents, nowhere.bind, skeleton.rest)
-    same_joints(map_character(by_rest), expected)
 
 
 NAMES = st.text("LlRr_:. 01Hhandindexthumb", min_size=1, max_size=6) | st.sampled_from(
@@ -545,7 +324,6 @@ def test_fast_enough_for_inspect() -> None:
 
 # --- the shared table of conventions -------------------------------------------------------------
 
-SHARED = Path(os.environ.get("USDHAND_SHARED", Path(__file__).parents[2] / "shared"))
 TABLE = SHARED / "hand-joint-conventions.json"
 
 
