@@ -206,15 +206,27 @@ def _accumulate(local: Costs, above: Costs, here: Costs, first: int, last: int) 
 def _remember(
     local: Costs, above: Costs, here: Costs, first: int, last: int, moves: Bytes, offset: int
 ) -> None:
-    for j in range(_U(first), _U(last + 1)):
-        before = here[j + _U(1)] - local[j]
-        move = _COLUMN_BEFORE
-        if above[j + _U(1)] == before:
-            move = _ROW_BEFORE
-        if above[j] == before:
-            move = _DIAGONAL
-        at = j - _U(first)
-        moves[_U(offset) + (at >> _U(2))] |= np.uint8(move << (_U(2) * (at & _U(3))))
+    cells = last + 1 - first
+    for k in range(_U(cells >> 2)):
+        j = _U(first) + (k << _U(2))
+        move = _move(local, above, here, j) | (_move(local, above, here, j + _U(1)) << 2)
+        move |= _move(local, above, here, j + _U(2)) << 4
+        moves[_U(offset) + k] = np.uint8(move | (_move(local, above, here, j + _U(3)) << 6))
+    for at in range(cells & ~3, cells):
+        move = _move(local, above, here, _U(first + at))
+        moves[offset + (at >> 2)] |= np.uint8(move << (2 * (at & 3)))
+
+
+@kernel
+def _move(local: Costs, above: Costs, here: Costs, j: np.uint64) -> int:
+    """Where the path to a cell comes from."""
+    before = here[j + _U(1)] - local[j]
+    move = _COLUMN_BEFORE
+    if above[j + _U(1)] == before:
+        move = _ROW_BEFORE
+    if above[j] == before:
+        move = _DIAGONAL
+    return move
 
 
 @kernel

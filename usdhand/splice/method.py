@@ -33,6 +33,8 @@ Wrist = Literal["body", "hands"]
 STILL_CM = 1.0
 # Lengths that differ by more than this factor are worth a warning.
 UNLIKELY_FACTOR = 2.0
+# However long the clips, steadier turns do not make the path of pass 1 another by more seconds.
+MOST_REACH_S = 5.0
 # Rounds of matching signs with the hand clip in the body's time.
 ROUNDS = 2
 # Beyond this many cells, the way back alone would need a gigabyte.
@@ -174,7 +176,8 @@ def align(
     signs = settings.smoothing, settings.dead_zone
     path = phase_path(body, hand, band, *signs, settings.align, settings.directions)
     if settings.align == "local":
-        reach = max(settings.band[1] * len(body) / 2, settings.least_band * settings.fps / 2)
+        reach = min(settings.band[1] * len(body) / 2, MOST_REACH_S * settings.fps)
+        reach = max(reach, settings.least_band * settings.fps / 2)
         near = band_along(path.middle, band, reach)
         path = steadied(body, hand, path, near, *signs, settings.directions)
     own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps

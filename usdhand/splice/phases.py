@@ -190,11 +190,12 @@ def _evidence(
 
 def steady_turns(body: Markers, hand: Markers, path: Array) -> Array:
     """(rows,) radians by which the hand clip turns onto the body along a path, equation (7)."""
-    level = [m.positions[..., [0, 2]] for m in (body, hand)]
-    p, q = (v - v.mean(axis=1, keepdims=True) for v in level)
-    q = q[np.clip(np.rint(path), 0, len(q) - 1).astype(np.intp)]
-    cosine = np.sum(p * q, axis=(1, 2))
-    sine = np.sum(p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0], axis=1)
+    around = np.eye(4) - 0.25  # markers less their mean
+    at = np.clip(np.rint(path), 0, len(hand) - 1).astype(np.intp)
+    p, q = around @ body.positions, hand.positions[at]
+    products = np.moveaxis(p, 1, 2) @ q  # axis of the body, axis of the hand
+    cosine = products[:, 0, 0] + products[:, 2, 2]
+    sine = products[:, 0, 2] - products[:, 2, 0]
     both = smoothed(np.stack([cosine, sine], axis=1), STEADY_S * body.fps)
     return np.asarray(np.arctan2(both[:, 1], both[:, 0]))
 

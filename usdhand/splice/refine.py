@@ -19,7 +19,7 @@ SMOOTHING_S, AROUND_S, AMPLITUDE_S, NOISE_S = 0.033, 1.0, 0.75, 0.33
 LEAST_ANGLE, LEAST_CM = np.radians(1.0), 0.05
 STIFFNESS = 300.0
 # Rounds of the linearised problem; more change the median error by less than 0.1 ms.
-ROUNDS = 4
+ROUNDS = 3
 
 
 def refined(
@@ -49,11 +49,11 @@ def refined(
         information, pull = np.zeros(len(body)), np.zeros(len(body))
         for ours, theirs, least in _compared(*pair):
             rate, apart = np.gradient(ours, axis=0) / slope, ours - theirs
-            squares = np.mean(apart**2, axis=1)
+            squares = _dot(apart, apart) / apart.shape[1]
             usual = max(float(np.median(squares)), least**2)
             noise = np.maximum(usual, smoothed(squares, NOISE_S * fps))
-            information += independent * np.sum(rate**2, axis=1) / noise
-            pull += independent * np.sum(rate * apart, axis=1) / noise
+            information += independent * _dot(rate, rate) / noise
+            pull += independent * _dot(rate, apart) / noise
         weights = information + held
         wanted = (information * moved + pull) / weights
         moved = np.clip(stiff(wanted, weights, STIFFNESS * (fps / 60.0) ** 4), -room, room)
@@ -70,14 +70,18 @@ def _compared(body: Markers, hand: Markers) -> Iterator[tuple[Array, Array, floa
     bends = (_unit(smoothed(m.forearm, SMOOTHING_S * fps)) for m in (body, hand))
     yield *bends, LEAST_ANGLE
     positions = [smoothed(m.positions, SMOOTHING_S * fps) for m in (body, hand)]
-    wrists = [p[:, :2].mean(axis=1) for p in positions]
+    wrists = [(p[:, 0] + p[:, 1]) / 2 for p in positions]
     palms = (_unit(p[:, [0, 3]] - w[:, None]) for p, w in zip(positions, wrists, strict=True))
     ours, theirs = (around(p.reshape(len(p), -1)) for p in palms)
     yield ours, theirs, LEAST_ANGLE
     ours, theirs = (around(w) for w in wrists)
-    both = np.stack([np.sum(ours * theirs, axis=1), np.sum(theirs**2, axis=1)], axis=1)
+    both = np.stack([_dot(ours, theirs), _dot(theirs, theirs)], axis=1)
     both = np.maximum(smoothed(both, AMPLITUDE_S * fps), 1e-9)
     yield ours, theirs * (both[:, :1] / both[:, 1:]), LEAST_CM
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(np.einsum("ti,ti->t", a, b))
 
 
 def _unit(v: Array) -> Array:
