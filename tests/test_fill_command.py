@@ -110,9 +110,12 @@ def test_body_is_untouched_and_report_is_whole(library_file: Path, tmp_path: Pat
 
 
 def test_alternatives_are_variants(library_file: Path, tmp_path: Path) -> None:
-    out, flat = tmp_path / "talk.usda", tmp_path / "flat.usdc"
+    out = tmp_path / "talk.usda"
     arguments = ("fill", BODY, "--library", library_file, "--alternatives", 3)
     data = json.loads(run(*arguments, "-o", out, "--json").stdout)
+    assert data["settings"]["alternatives"] == 3
+    assert data["settings"]["segmentation"]["longest"] == 0.5
+    assert {"maps", "flatten", "pool", "replace", "add_fingers"} <= set(data["settings"])
     costs = [a["cost"] for a in data["alternatives"]]
     assert len(costs) == 3
     assert costs == sorted(costs)
@@ -127,9 +130,38 @@ def test_alternatives_are_variants(library_file: Path, tmp_path: Path) -> None:
     assert np.array_equal(motions[0], skel_rotations(out))
     assert np.abs(motions[0] - motions[1]).max() > 0.01
     assert np.abs(motions[1] - motions[2]).max() > 0.01
-    text = run(*arguments, "-o", flat, "--flatten").output
-    assert "only the best alternative" in text
-    assert np.array_equal(motions[0], skel_rotations(flat))
+    for number, one in enumerate(data["alternatives"], 1):
+        assert set(one["hands"]) == {"left", "right"}
+        for side, hand in one["hands"].items():
+            assert [s["clip"] for s in hand["segments"]] == one["clips"][side]
+            assert {"start", "end", "clip_start", "clip_end", "cost"} <= set(hand["segments"][0])
+            assert hand["seams"]["max_acceleration_deg_s2"] > 0
+        pieces = [(s["clip"], s["clip_start"]) for s in one["hands"]["left"]["segments"]]
+        best = [(s["clip"], s["clip_start"]) for s in data["hands"]["left"]["segments"]]
+        assert (pieces == best) == (number == 1)
+
+
+@pytest.mark.parametrize("suffix", [".usda", ".usdz"])
+def test_one_file_keeps_the_alternatives(library_file: Path, tmp_path: Path, suffix: str) -> None:
+    over, flat = tmp_path / "over.usdc", tmp_path / "deep" / f"flat{suffix}"
+    flat.parent.mkdir()
+    arguments = ("fill", BODY, "--library", library_file, "--alternatives", 2, "--side", "left")
+    run(*arguments, "-o", over)
+    run(*arguments, "-o", flat, "--flatten")
+    moved = flat.rename(tmp_path / f"moved{suffix}")
+    stage = Usd.Stage.Open(str(moved))
+    files = {Path(layer.realPath).name for layer in stage.GetUsedLayers() if layer.realPath}
+    assert not files & {"talk_01_body.usdc", "ada.usdc", "over.usdc"}
+    [prim] = [p for p in stage.Traverse() if p.GetName() == "HandMotion"]
+    chosen = prim.GetVariantSets().GetVariantSet("fingers")
+    assert chosen.GetVariantNames() == ["choice_1", "choice_2"]
+    assert chosen.GetVariantSelection() == "choice_1"
+    assert np.array_equal(skel_rotations(moved), skel_rotations(over))
+    for name in ("choice_1", "choice_2"):
+        assert np.array_equal(skel_rotations(moved, name), skel_rotations(over, name))
+    assert np.abs(skel_rotations(moved, "choice_2") - skel_rotations(moved)).max() > 0.01
+    assert animation(moved).GetPrim().GetPath() == prim.GetPath()
+    run("check", moved)
 
 
 def test_limits_hold_and_results_repeat(body: Clip, library: MotionLibrary) -> None:
@@ -245,6 +277,65 @@ def test_more_candidates_than_there_are(body: Clip, library: MotionLibrary) -> N
     assert len(filled.clips) in (1, 2)
 
 
+def test_a_library_smaller_than_k_is_noted(tmp_path: Path) -> None:
+    library = tmp_path / "l.usdc"
+    run("library", "build", SAMPLES / "gestures" / "ok_01.usdc", "-o", library, "-q")
+    arguments = ("fill", BODY, "--library", library, "-o", tmp_path / "o.usda", "--force")
+    text = run(*arguments, "--k", 100).output
+    assert "has only" in text
+    assert "the 100 candidates" in text
+    assert "has only" not in run(*arguments, "--k", 4).output
+
+
+def without_joints(library: MotionLibrary, gone: tuple[str, ...]) -> MotionLibrary:
+    """A library of rigs that lack some hand joints."""
+    clips = []
+    for clip in library.clips:
+        hands = {}
+        for side, hand in clip.hands.items():
+            names = tuple(j for j in hand.joints if j not in gone)
+            hands[side] = replace(hand, joints=names, fingers=hand.curves_of(names))
+        clips.append(replace(clip, hands=hands))
+    return replace(library, clips=tuple(clips))
+
+
+def test_joints_that_no_library_clip_has_are_kept(
+    body: Clip, library: MotionLibrary, tmp_path: Path
+) -> None:
+    gone = ("ThumbIP", "PinkyDIP")
+    few = without_joints(library, gone)
+    filled = filling.fill_fingers(body, few)
+    assert filled.missing == {"left": gone, "right": gone}
+    frames = api.find_hands(body).frames
+    kept = [
+        int(j) for f in frames.values() for n, j in zip(f.names, f.joints, strict=True) if n in gone
+    ]
+    assert np.array_equal(filled.clips[0].rotations[:, kept], body.rotations[:, kept])
+    assert set(filled.changed) == {int(j) for f in frames.values() for j in f.joints} - set(kept)
+    assert np.ptp(filled.clips[0].rotations[:, list(filled.changed)], axis=0).max() > 0.1
+    path = tmp_path / "few.usdc"
+    filling.write_library(few, path)
+    out = tmp_path / "o.usda"
+    text = run("fill", BODY, "--library", path, "-o", out).output
+    assert "no clip of the library has ThumbIP, PinkyDIP of the left hand" in text
+    one = replace(few, clips=(*few.clips[:1], library.clips[5]))  # most joints, if of few clips
+    assert filling.fill_fingers(body, one).missing == {}
+    take = api.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
+    errors, left = filling.measure_library(few, SAMPLES, FillSettings(), takes=[take])
+    assert not left
+    assert all(np.isfinite(e.degrees) for e in errors)
+
+
+def test_both_hands_as_one_have_figures_of_their_own(library_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "o.usda"
+    data = json.loads(
+        run("fill", BODY, "--library", library_file, "-o", out, "--couple", "--json").stdout
+    )
+    left, right = (data["hands"][s]["seams"] for s in ("left", "right"))
+    assert left["times_s"] == right["times_s"]
+    assert left["max_acceleration_deg_s2"] != right["max_acceleration_deg_s2"]
+
+
 def test_a_body_without_motion(body: Clip, library: MotionLibrary) -> None:
     still = body.with_rotations(np.repeat(body.rotations[:1], len(body), axis=0))
     filled = filling.fill_fingers(still, library)
@@ -261,8 +352,10 @@ def test_wrong_inputs_are_refused(library_file: Path, tmp_path: Path, wrong: str
     else:
         body = library_file
     out = tmp_path / "a.usda"
-    code = 2 if wrong == "body is library" else 3  # which of its skeletons?
+    code = 2 if wrong == "body is library" else 3
     text = run("fill", body, "--library", given, "-o", out, code=code).output
+    if wrong == "body is library":
+        assert "is a motion library" in text
     assert "Traceback" not in text
     assert not out.exists()
 

@@ -194,19 +194,124 @@ def test_what_is_no_library_is_not_replaced(folder: Path) -> None:
     assert other.read_bytes() == before
 
 
-@pytest.mark.parametrize("damage", ["version", "array", "segments"])
-def test_a_damaged_library_is_refused(library: Path, damage: str) -> None:
+def edit_prim(library: Path, name: str, value: object) -> None:
     layer = Sdf.Layer.FindOrOpen(str(library))
-    clip = "/Library/Clips/ok_01.usdhand:right:"
-    if damage == "version":
-        layer.GetAttributeAtPath("/Library.usdhand:libraryVersion").default = 99
-    elif damage == "array":
-        layer.GetAttributeAtPath(f"{clip}arm").default = [1.0, 2.0]
-    else:
-        layer.GetAttributeAtPath(f"{clip}segments").default = [(0, 100000)]
+    layer.GetAttributeAtPath(f"/Library{name}").default = value
     layer.Save()
-    with pytest.raises(InputError):
+
+
+def test_a_library_of_another_version_is_refused(library: Path) -> None:
+    edit_prim(library, ".usdhand:libraryVersion", 99)
+    with pytest.raises(InputError, match="version 99"):
         filling.read_library(library)
+    edit_prim(library, ".usdhand:libraryVersion", 1)
+    edit_prim(library, ".usdhand:segmentation:speed", -1.0)
+    with pytest.raises(InputError, match="segmentation"):
+        filling.read_library(library)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("right:arm", [1.0, 2.0]),
+        ("right:arm", []),
+        ("right:segments", [(0, 100000)]),
+        ("right:segments", [(4, 4)]),
+        ("right:joints", ["Nose"]),
+        ("height", 0.0),
+        ("height", float("nan")),
+        ("height", -170.0),
+        ("fps", float("inf")),
+        ("left:fingers", None),
+    ],
+)
+def test_a_damaged_clip_is_left_out_and_listed(library: Path, name: str, value: object) -> None:
+    edit_prim(library, f"/Clips/ok_01.usdhand:{name}", value)
+    read = filling.read_library(library)
+    assert [c.name for c in read.clips] == ["big_01", "ok_02", "wipe_01"]
+    assert [entry.path for entry in read.damaged] == ["/Library/Clips/ok_01"]
+    text = run("library", "info", library).output
+    assert "cannot be used: /Library/Clips/ok_01: it" in text
+
+
+def test_not_a_number_and_foreign_prims(folder: Path, library: Path) -> None:
+    layer = Sdf.Layer.FindOrOpen(str(library))
+    fingers = layer.GetAttributeAtPath("/Library/Clips/ok_01.usdhand:left:fingers")
+    values = list(fingers.default)
+    values[7] = float("nan")
+    fingers.default = values
+    layer.Save()
+    stage = Usd.Stage.Open(str(library))
+    stage.DefinePrim("/Library/Clips/Camera", "Camera")
+    for name in ("big_01", "wipe_01"):
+        stage.GetPrimAtPath(f"/Library/Clips/{name}").SetActive(False)
+    stage.Save()
+    del stage
+    read = filling.read_library(library)
+    assert [c.name for c in read.clips] == ["ok_02"]
+    reasons = {entry.path: entry.reason for entry in read.damaged}
+    assert "no usdhand:name" in reasons["/Library/Clips/Camera"]
+    assert "no numbers" in reasons["/Library/Clips/ok_01"]
+    body = REPOSITORY / "samples" / "conversations" / "talk_01_body.usdc"
+    text = run("fill", body, "--library", library, "-o", library.parent / "o.usda").output
+    assert "/Library/Clips/ok_01 of the library cannot be used" in text
+    assert build(folder)["read"] == 3  # what is damaged is read again
+    assert filling.read_library(library).damaged == ()
+    stage = Usd.Stage.Open(str(library))
+    for prim in stage.GetPrimAtPath("/Library/Clips").GetChildren():
+        prim.GetAttribute("usdhand:duration").Set(0.0)
+    stage.Save()
+    with pytest.raises(InputError, match="none of its 4 clips"):
+        filling.read_library(library)
+
+
+def test_folders_in_folders(folder: Path) -> None:
+    (folder / "gestures" / "more" / "deep").mkdir(parents=True)
+    (folder / "gestures" / ".cache").mkdir()
+    flat = Usd.Stage.Open(str(GESTURES / "small_03.usdc")).Flatten()
+    for place in ("more/deep", ".cache"):
+        flat.Export(str(folder / "gestures" / place / "small_03.usdc"))
+    built = build(folder)
+    assert built["clips"] == 5
+    clips = filling.read_library(folder / "library.usdc").clips
+    assert clips[3].path == "gestures/more/deep/small_03.usdc"
+    again = run("library", "build", folder, "-o", folder / "library.usdc", "--json")
+    left = {x["path"]: x["reason"] for x in json.loads(again.stdout)["left_out"]}
+    assert all(path.startswith("characters/") for path in left)
+    shutil.copy(folder / "library.usdc", folder / "gestures" / "old.usdc")
+    text = run("library", "build", folder / "gestures", "-o", folder / "library.usdc").output
+    assert text.count("left out: gestures/old.usdc: it is a motion library") == 1
+    (folder / "empty" / "inside").mkdir(parents=True)
+    message = run("library", "build", folder / "empty", "-o", folder / "e.usdc", code=2).output
+    assert "folders below" in message
+
+
+def test_labels_without_a_clip_are_reported(folder: Path) -> None:
+    table = folder / "labels.csv"
+    table.write_text("file,label\nok_01,circle\nok_9,x\nother/ok_02,y\n")
+    arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
+    text = run(*arguments, "--labels", table).output
+    assert "2 rows match no clip: ok_9, other/ok_02" in text
+    data = json.loads(run(*arguments, "--labels", table, "--json").stdout)
+    assert data["labels_without_clip"] == ["ok_9", "other/ok_02"]
+    assert data["settings"]["segmentation"]["speed"] == 15.0
+
+
+def test_an_interruption_says_what_was_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from usdhand.cli import library as verb
+
+    def interrupted(items, _):  # type: ignore[no-untyped-def]
+        for number, item in enumerate(items):
+            if number == 2:
+                raise KeyboardInterrupt
+            yield item
+
+    monkeypatch.setattr(verb, "_progress", interrupted)
+    arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
+    text = run(*arguments, code=1).output
+    assert "2 clips read so far are kept" in text
+    monkeypatch.undo()
+    assert build(folder)["read"] == 2
 
 
 def test_output_is_valid(library: Path) -> None:

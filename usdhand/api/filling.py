@@ -1,40 +1,29 @@
-"""Method 2 on clips and files: build a library, fill bodies from it, measure it."""
+"""Method 2 on clips and files: fill bodies from a library, measure it."""
 
 from __future__ import annotations
 
-import multiprocessing
-import re
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath
+from collections.abc import Sequence
+from pathlib import Path
 
 from usdhand.anatomy import SIDES, Conventions, Side, load_conventions
 from usdhand.api.clips import find_hands
 from usdhand.api.finger_joints import lacks_fingers
-from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
-from usdhand.fill import (
-    Filled,
-    FillSettings,
-    LibraryClip,
-    MotionLibrary,
-    Segmentation,
-    fill,
-    library_clip,
+from usdhand.api.libraries import (
+    BuildResult,
+    build_library,
+    forget_interrupted,
+    gone_clips,
+    label_of,
 )
+from usdhand.errors import HandNotFoundError, UsdHandError
+from usdhand.fill import Filled, FillSettings, LibraryClip, MotionLibrary, fill
 from usdhand.fill.candidates import SearchSpace
 from usdhand.fill.library import Left, Part
 from usdhand.fill.reconstruction import HandError, reconstruction_errors
 from usdhand.formats.files import read_clip, reopened, source_file
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.add_joints import author_joints, joint_count
-from usdhand.formats.usd.library import (
-    is_library,
-    read_library,
-    relative_path,
-    write_library,
-)
+from usdhand.formats.usd.library import is_library, read_library, write_library
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 
@@ -42,166 +31,15 @@ __all__ = [
     "BuildResult",
     "build_library",
     "fill_fingers",
+    "forget_interrupted",
     "gone_clips",
     "is_library",
+    "label_of",
     "measure_library",
     "read_library",
     "write_filled",
     "write_library",
 ]
-
-
-@dataclass(frozen=True)
-class BuildResult:
-    """A built library and how many of its clips were read anew or taken over as they were."""
-
-    library: MotionLibrary
-    read: int
-    unchanged: int
-
-
-@dataclass(frozen=True)
-class _Task:
-    """One clip to read; goes to another process."""
-
-    path: Path
-    name: str
-    relative: str
-    content_hash: str
-    label: str
-    actor: str
-    segmentation: Segmentation
-    maps: tuple[Path, ...]
-
-
-def build_library(
-    paths: Sequence[Path],
-    output: Path,
-    *,
-    segmentation: Segmentation | None = None,
-    labels: Mapping[str, tuple[str, str]] | None = None,
-    previous: MotionLibrary | None = None,
-    maps: Sequence[Path] = (),
-    jobs: int = 1,
-    progress: Callable[[Iterable[object], int], Iterable[object]] | None = None,
-    keep: float = 10.0,
-) -> BuildResult:
-    """Read clips into a library; a clip that cannot be used is left out with its reason.
-
-    Parameters
-    ----------
-    output : where the library will be written, for relative paths
-    labels : file -> (label, actor), the file with as many of its folders as tell it apart, with
-        or without its suffix; else labels come from file names
-    previous : clips whose content has not changed are taken over from it, edited labels included
-    jobs : processes
-    keep : seconds after which what was read is kept beside the output, so that a build that was
-        interrupted goes on where it was
-    progress : wraps the iteration over finished clips; gets it and their number
-
-    Raises
-    ------
-    InputError
-        if no clip can be used.
-    """
-    cutting = segmentation or Segmentation()
-    kept = _kept_file(output)
-    known = _known([previous, _read_kept(kept)])
-    tasks: list[_Task] = []
-    clips: list[LibraryClip] = []
-    left: list[Left] = []
-    for path, name in zip(paths, _unique_names(paths), strict=True):
-        content = file_hash(path)
-        relative = relative_path(path, output)
-        if content is None:
-            left.append(Left(relative, "no such file"))
-            continue
-        given = _given_label(path, labels or {})
-        label, actor = given or (label_of(path.stem), "")
-        old, cut_as = known.get((content, relative)) or known.get((content, "")) or (None, cutting)
-        if old is None:
-            task = _Task(path, name, relative, content, label, actor, cutting, tuple(maps))
-            tasks.append(task)
-            continue
-        if given or old.label == label_of(PurePosixPath(old.path).stem):  # not edited
-            old = replace(old, label=label, actor=actor or old.actor)
-        old = replace(old, name=name, path=relative)
-        clips.append(old if cut_as == cutting else _cut_again(old, cutting))
-    unchanged = len(clips)
-    results = _run(tasks, jobs)
-    next_time = time.monotonic() + keep
-    try:
-        for done in progress(results, len(tasks)) if progress else results:
-            (clips if isinstance(done, LibraryClip) else left).append(done)  # type: ignore[arg-type]
-            if time.monotonic() > next_time:
-                # A tenth of the time at most: the larger the library, the rarer.
-                next_time += max(keep, 10.0 * _keep(clips[unchanged:], cutting, kept))
-    except BaseException:
-        _keep(clips[unchanged:], cutting, kept)
-        raise
-    if not clips:
-        reasons = "; ".join(f"{entry.path}: {entry.reason}" for entry in left[:3])
-        raise InputError(f"No clip can be used for a library. {reasons}")
-    ordered = tuple(sorted(clips, key=lambda c: c.name))
-    library = MotionLibrary(ordered, cutting, tuple(sorted(left, key=lambda entry: entry.path)))
-    return BuildResult(library, len(ordered) - unchanged, unchanged)
-
-
-def forget_interrupted(output: Path) -> None:
-    """Remove what an interrupted build of this library kept; it is in the library now."""
-    _kept_file(output).unlink(missing_ok=True)
-
-
-def gone_clips(library: MotionLibrary, folder: Path) -> list[str]:
-    """Paths of clips whose file is not there; filling needs none of them, `measure_library` all."""
-    return [clip.path for clip in library.clips if not (folder / clip.path).is_file()]
-
-
-def _kept_file(output: Path) -> Path:
-    return output.with_name(f".{output.stem}.interrupted.usdc")
-
-
-def _keep(clips: Sequence[LibraryClip], segmentation: Segmentation, path: Path) -> float:
-    """Write what was read so far; seconds that it took."""
-    start = time.monotonic()
-    if clips:
-        write_library(MotionLibrary(tuple(clips), segmentation), path, force=True)
-    return time.monotonic() - start
-
-
-def _read_kept(path: Path) -> MotionLibrary | None:
-    try:
-        return read_library(path) if path.exists() else None
-    except InputError:
-        return None
-
-
-def _known(
-    libraries: Iterable[MotionLibrary | None],
-) -> dict[tuple[str, str], tuple[LibraryClip, Segmentation]]:
-    """Clips by content and path, and by content alone, with how they were cut."""
-    known: dict[tuple[str, str], tuple[LibraryClip, Segmentation]] = {}
-    for library in libraries:
-        for clip in library.clips if library else ():
-            for key in ((clip.content_hash, clip.path), (clip.content_hash, "")):
-                known.setdefault(key, (clip, library.segmentation))  # type: ignore[union-attr]
-    return known
-
-
-def _given_label(path: Path, labels: Mapping[str, tuple[str, str]]) -> tuple[str, str] | None:
-    """What is said of a file under its name, with or without folders and suffix."""
-    for whole in (path.absolute(), path.absolute().with_suffix("")):
-        for start in range(len(whole.parts)):
-            found = labels.get("/".join(whole.parts[start:]))
-            if found:
-                return found
-    return None
-
-
-def label_of(stem: str) -> str:
-    """Label in a file name: what stands before a running number, ``doubt_shrug_03``; else none."""
-    found = re.fullmatch(r"(.*?[A-Za-z])[ _.-]*\d+", stem)
-    return found.group(1) if found else ""
 
 
 def fill_fingers(
@@ -244,7 +82,6 @@ def write_filled(
     *,
     flatten: bool = False,
     force: bool = False,
-    conventions: Conventions | None = None,
     inputs: Sequence[Path] = (),
 ) -> None:
     """Write a filled body as a layer over its file; alternatives are variants of the animation.
@@ -254,16 +91,14 @@ def write_filled(
     """
     best = filled.clips[0]
     character = reopened(best)
-    sides = [side for part in filled.parts for side in part.part]
-    hands = find_hands(best, conventions, sides)
-    changed = {int(j) for frames in hands.frames.values() for j in frames.joints}
-    changed |= set(range(joint_count(character), len(best.skeleton)))
+    added = range(joint_count(character), len(best.skeleton))
+    changed = sorted({*filled.changed, *added})
     digits = len(str(len(filled.clips)))  # so that editors sort them
     variants = {f"choice_{i:0{digits}}": clip for i, clip in enumerate(filled.clips, 1)}
     write_motion(
         character,
         best,
-        sorted(changed),
+        changed,
         Path(output),
         flatten=flatten,
         force=force,
@@ -321,68 +156,3 @@ def measure_library(
 
 def _library_source(clip: LibraryClip, folder: Path) -> Clip:
     return read_clip(folder / clip.path, clip.skel or None)
-
-
-def _run(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Left]:
-    if jobs <= 1 or len(tasks) < 2:
-        return map(_read, tasks)
-    return _in_processes(tasks, jobs)
-
-
-def _in_processes(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Left]:
-    # Not forked: USD has threads, and a copy of a process with threads may hang.
-    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"))
-    try:
-        yield from pool.map(_read, tasks, chunksize=max(1, min(16, len(tasks) // (8 * jobs))))
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _read(task: _Task) -> LibraryClip | Left:
-    try:
-        clip = read_clip(task.path)
-        if len(clip) < 2:
-            return Left(task.relative, "it is a single frame")
-        conventions = load_conventions(*task.maps) if task.maps else None
-        made = library_clip(
-            clip,
-            find_hands(clip, conventions),
-            task.segmentation,
-            path=task.relative,
-            content_hash=task.content_hash,
-            label=task.label,
-            actor=task.actor,
-        )
-        if not made.hands:
-            return Left(task.relative, "its fingers do not move")
-        return replace(made, name=task.name)
-    except UsdHandError as error:
-        return Left(task.relative, str(error))
-
-
-def _cut_again(clip: LibraryClip, segmentation: Segmentation) -> LibraryClip:
-    """Return a clip with other segments; its motion need not be read again."""
-    from usdhand.fill.candidates import part_segments
-
-    hands = {
-        side: replace(hand, segments=tuple(part_segments([hand.arm], segmentation)))
-        for side, hand in clip.hands.items()
-    }
-    return replace(clip, hands=hands)
-
-
-def _unique_names(paths: Sequence[Path]) -> list[str]:
-    """File names without suffix; where they repeat, with the folder's name before."""
-    if len(set(paths)) < len(paths):
-        raise UsageError("A clip is given twice.")
-    stems = [path.stem for path in paths]
-    names: list[str] = []
-    for path in paths:
-        repeated = stems.count(path.stem) > 1
-        wanted = f"{path.absolute().parent.name}_{path.stem}" if repeated else path.stem
-        name, number = wanted, 1
-        while name in names or (name != path.stem and name in stems):
-            number += 1
-            name = f"{wanted}_{number}"
-        names.append(name)
-    return names

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,9 @@ from usdhand.cli.common import (
 )
 
 if TYPE_CHECKING:
+    from usdhand.fill.library import Left
     from usdhand.fill.reconstruction import HandError
+    from usdhand.motion import Clip
 
 
 @click.command("evaluate")
@@ -74,9 +77,8 @@ def command(
       usdhand library build samples/gestures -o gestures.usdc
       usdhand evaluate gestures.usdc
     """
-    from dataclasses import replace
+    from dataclasses import asdict, replace
 
-    from usdhand import api
     from usdhand.api import filling
     from usdhand.errors import InputError
     from usdhand.fill import PAPER, FillSettings
@@ -98,23 +100,44 @@ def command(
             raise
         warn(str(error), quiet)
     errors: list[HandError] = []
+    left_out: list[Left] = []
+    for entry in motions.damaged:
+        warn(f"{entry.path} of the library cannot be used: {entry.reason}", quiet)
     if not labels_only:
-        given = [api.read_clip(p) for p in with_progress(paths, "reading")] if paths else None
+        given, unread = _read(paths) if paths else (None, [])
         errors, left = filling.measure_library(
             motions, library.absolute().parent, settings, takes=given, maps=maps
         )
-        for take in left:
+        left_out = [*unread, *left]
+        for take in left_out:
             warn(f"left out: {take.path}: {take.reason}", quiet)
         if not errors:
             raise InputError("No clip could be filled from the others.")
     result = evaluation_result(agreements, errors)
-    shown = {"k": k, "preset": preset, "metric": settings.metric}
+    result |= {"left_out": [{"path": take.path, "reason": take.reason} for take in left_out]}
+    shown = {"k": k, "preset": preset, "metric": settings.metric, "maps": maps}
+    shown |= {"labels_only": labels_only, "fill": asdict(settings)}
     text = dumps(document("evaluate", [library, *paths, *maps], shown, result))
     write_report(report, text, force)
     if as_json:
         click.echo(text)
     else:
         say(_text(result), quiet)
+
+
+def _read(paths: Sequence[Path]) -> tuple[list[Clip], list[Left]]:
+    """Clips, and the files that are none."""
+    from usdhand import api
+    from usdhand.errors import UsdHandError
+    from usdhand.fill.library import Left
+
+    clips, left = [], []
+    for path in with_progress(paths, "reading"):
+        try:
+            clips.append(api.read_clip(path))
+        except UsdHandError as error:
+            left.append(Left(str(path), str(error)))
+    return clips, left
 
 
 def _text(result: dict[str, Any]) -> str:

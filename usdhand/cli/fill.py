@@ -113,11 +113,12 @@ def command(
       usdhand library build samples/gestures -o gestures.usdc
       usdhand fill samples/conversations/talk_01_body.usdc --library gestures.usdc -o talk.usda
     """
-    from dataclasses import replace
+    from dataclasses import asdict, replace
 
     from usdhand import api
     from usdhand.api import filling
     from usdhand.api.finger_joints import fingers_from_library, fingers_like, lacks_fingers
+    from usdhand.errors import UsageError
     from usdhand.fill import PAPER, FillSettings
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
@@ -136,6 +137,10 @@ def command(
     check_report(report, force)
     conventions = api.conventions_from(maps)
     motions = filling.read_library(library)
+    for entry in motions.damaged:
+        warn(f"{entry.path} of the library cannot be used: {entry.reason}", quiet)
+    if body.suffix.lower() in USD_SUFFIXES and filling.is_library(body):
+        raise UsageError(f"{body} is a motion library; give the clip to be filled, then --library.")
     clip = api.read_clip(body, skel)
     warn_of(clip, quiet)
     bare = lacks_fingers(clip, conventions, sides(side))
@@ -164,16 +169,22 @@ def command(
         warn(f"{body}: the {' and '.join(filled.kept)} fingers move already and are kept", quiet)
     for hand in filled.without:
         warn(f"the library has no motion of a {hand} hand like this; it stays as it is", quiet)
-    if len(filled.clips) > 1 and (flatten or output.suffix.lower() == ".usdz"):
-        warn("a flattened file holds only the best alternative: USD keeps no variants there", quiet)
+    for hand, names in filled.missing.items():
+        warn(f"no clip of the library has {', '.join(names)} of the {hand} hand: kept", quiet)
+    for part in filled.parts:
+        if part.usable < settings.k:
+            hands = " and ".join(part.part)
+            warn(
+                f"the library has only {part.usable} segments for the {hands} hand, fewer than "
+                f"the {settings.k} candidates a segment that were asked for",
+                quiet,
+            )
     if len(filled.clips) < alternatives:
         warn(f"there are only {len(filled.clips)} ways that really differ", quiet)
     if filled.left_out:
         warn(f"not used, since it is the same clip: {', '.join(filled.left_out)}", quiet)
     if not dry_run:
-        filling.write_filled(
-            filled, output, flatten=flatten, force=force, conventions=conventions, inputs=[library]
-        )
+        filling.write_filled(filled, output, flatten=flatten, force=force, inputs=given_files[1:])
     result = fill_result(filled, motions, clip) | {"output": None if dry_run else str(output)}
     if added:
         joints = {hand: list(paths) for hand, paths in added.grafted.added.items()}
@@ -187,9 +198,11 @@ def command(
                 f"{max(max(x, 1 / x) for x in odd):.1f} times faster or slower",
                 quiet,
             )
-    shown = {"preset": preset, "side": side, "replace": replace_motion, "metric": settings.metric}
-    more = {"k": settings.k, "alternatives": alternatives, "couple": couple, "skel": skel}
-    text = dumps(document("fill", [*given_files, *maps], shown | more, result))
+    cutting = settings.segmentation or motions.segmentation
+    shown = asdict(settings) | {"segmentation": asdict(cutting), "preset": preset, "side": side}
+    shown |= {"replace": replace_motion, "add_fingers": bool(added), "fingers_from": fingers_from}
+    shown |= {"skel": skel, "maps": maps, "flatten": flatten}
+    text = dumps(document("fill", [*given_files, *maps], shown, result))
     write_report(report, text, force)
     if as_json:
         click.echo(text)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ from usdhand.cli.common import (
     warn,
     write_report,
 )
+from usdhand.errors import UsageError, UsdHandError
+from usdhand.formats.suffixes import READABLE
 
 COLUMNS = {"file", "label", "actor"}
 OUTPUTS = (".usd", ".usda", ".usdc")
@@ -76,8 +79,9 @@ def build(
 ) -> None:
     """Read clips with body and fingers into a library.
 
-    Run again, it reads only what changed and keeps labels that someone edited. A clip that cannot
-    be used is reported and left out. The library is a USD stage with a prim a clip.
+    A folder stands for all clips in it and in the folders below. Run again, it reads only what
+    changed and keeps labels that someone edited. A clip that cannot be used is reported and left
+    out. The library is a USD stage with a prim a clip.
 
     \b
     Examples:
@@ -90,39 +94,53 @@ def build(
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import library_result
 
-    paths = [p for p in find_files(clips) if not _same(p, output)]
+    paths = [p for p in _files(clips) if not _same(p, output)]
     check_output(output, paths, True, OUTPUTS)
     check_report(report, force)
     if output.exists() and not filling.is_library(output):
         raise OutputError(f"{output} exists and is no motion library; give another name.")
     previous = filling.read_library(output) if output.exists() and not rebuild else None
     segmentation = _segmentation(speed, shortest, longest, previous)
-    result = filling.build_library(
-        paths,
-        output,
-        segmentation=segmentation,
-        labels=_read_labels(labels) if labels else None,
-        previous=previous,
-        maps=maps,
-        jobs=jobs,
-        progress=_progress,
-    )
+    try:
+        result = filling.build_library(
+            paths,
+            output,
+            segmentation=segmentation,
+            labels=_read_labels(labels) if labels else None,
+            previous=previous,
+            maps=maps,
+            jobs=jobs,
+            progress=_progress,
+        )
+    except KeyboardInterrupt:
+        raise InterruptedBuildError(_what_is_kept(output)) from None
     filling.write_library(result.library, output, force=True)
     filling.forget_interrupted(output)
     data = library_result(result.library) | {
         "output": str(output),
         "read": result.read,
         "unchanged": result.unchanged,
+        "labels_without_clip": list(result.unmatched),
     }
-    settings = {"jobs": jobs, "labels": labels, "rebuild": rebuild}
+    settings: dict[str, Any] = {"jobs": jobs, "labels": labels, "rebuild": rebuild, "maps": maps}
+    settings["segmentation"] = asdict(result.library.segmentation)
     text = dumps(document("library", [*paths, *maps], settings, data))
     write_report(report, text, force)
     if as_json:
         click.echo(text)
         return
+    for entry in previous.damaged if previous else ():
+        warn(f"{entry.path} of the old library cannot be used: {entry.reason}", quiet)
     for left in result.library.left_out:
         warn(f"left out: {left.path}: {left.reason}", quiet)
-    say(_text(data) + f"\n{result.read} clips read, {result.unchanged} unchanged", quiet)
+    if result.unmatched:
+        some = ", ".join(result.unmatched[:3]) + (", ..." if len(result.unmatched) > 3 else "")
+        warn(f"{labels}: {len(result.unmatched)} rows match no clip: {some}", quiet)
+    say(
+        _text(data | {"left_out": []})
+        + f"\n{result.read} clips read, {result.unchanged} unchanged",
+        quiet,
+    )
     say(f"written to {output}", quiet)
 
 
@@ -161,8 +179,45 @@ def _text(data: dict[str, Any]) -> str:
     if data["labels"]:
         lines.append("labels: " + ", ".join(f"{k} ({n})" for k, n in data["labels"].items()))
     lines += [f"left out: {x['path']}: {x['reason']}" for x in data["left_out"]]
+    lines += [f"cannot be used: {x['path']}: {x['reason']}" for x in data["damaged"]]
     lines += [f"file gone (fine for fill, not for evaluate): {path}" for path in data["gone"]]
     return "\n".join(lines)
+
+
+def _files(arguments: Sequence[str]) -> list[Path]:
+    """Files named, matching wildcards, or anywhere below folders; each once."""
+    found: dict[Path, Path] = {}
+    for argument in arguments:
+        folder = Path(argument)
+        if folder.is_dir():
+            below = (p for p in sorted(folder.rglob("*")) if p.suffix.lower() in READABLE)
+            paths = [p for p in below if p.is_file() and not _hidden(p.relative_to(folder))]
+            if not paths:
+                raise UsageError(
+                    f"{folder} and the folders below hold no {', '.join(READABLE)} file."
+                )
+        else:
+            paths = find_files([argument])
+        for path in paths:
+            found.setdefault(path.absolute(), path)
+    return list(found.values())
+
+
+def _hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)
+
+
+def _what_is_kept(output: Path) -> str:
+    from usdhand.api.libraries import interrupted_clips
+
+    count = interrupted_clips(output)
+    kept = f"{count} clips read so far are kept" if count else "nothing was read yet"
+    old = "; the library is as it was" if output.exists() else ""
+    return f"Interrupted: {kept}{old}. The same command goes on where it stopped."
+
+
+class InterruptedBuildError(UsdHandError):
+    """A build was interrupted (exit 1)."""
 
 
 def _segmentation(

@@ -17,6 +17,7 @@ from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
 REFERENCE_HEIGHT_CM = 170.0
+SMALLEST_HEIGHT_CM = 1.0  # less is no body, but joints in one place
 HEAD_TO_HEIGHT = 0.93  # lowest joint to the head joint, which lies at the top of the neck
 ARM_TO_HEIGHT = 0.332  # shoulder to wrist
 FOREARM_TO_ARM = 0.44
@@ -62,9 +63,12 @@ def body_height(skeleton: Skeleton, hands: Hands) -> float:
         body = [j for j in range(len(skeleton)) if j == hips or hips in skeleton.ancestors(j)]
         heights = skeleton.bind_positions[:, 1]
         # Not to the highest joint: some rigs have eyes, hair or an end above the head joint.
-        return float(heights[character.head] - heights[body].min()) / HEAD_TO_HEIGHT
-    lengths = [_arm_length(skeleton, h) for h in character.hands.values()]
-    return max(lengths) / ARM_TO_HEIGHT if max(lengths) > 0 else REFERENCE_HEIGHT_CM
+        height = float(heights[character.head] - heights[body].min()) / HEAD_TO_HEIGHT
+        if height > SMALLEST_HEIGHT_CM:  # else the bind pose does not stand
+            return height
+    length = max(_arm_length(skeleton, h) for h in character.hands.values())
+    height = length / ARM_TO_HEIGHT
+    return height if height > SMALLEST_HEIGHT_CM else REFERENCE_HEIGHT_CM
 
 
 def _arm_length(skeleton: Skeleton, hand: HandMap) -> float:

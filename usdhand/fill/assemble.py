@@ -20,6 +20,9 @@ BLEND_MAX_DEG = 20.0
 SEAM_SMOOTHING_S = 0.033
 SEAM_WINDOW_S = 0.1
 
+# A curve that goes beyond a limit bends away from it so many seconds before and after.
+LIMIT_REACH_S = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -78,9 +81,31 @@ def soften_seams(curves: Array, seams: Sequence[int], fps: float) -> Array:
     return np.asarray(curves + weight * (smooth - curves))
 
 
-def limited(curves: Array, low: Array, high: Array) -> Array:
-    """Curves (frames, channels) kept within limits (channels,)."""
-    return np.clip(curves, low, high)
+def limited(curves: Array, low: Array, high: Array, fps: float) -> Array:
+    """Curves (frames, channels) kept within limits (channels,), without corners.
+
+    Where a curve goes beyond a limit, the excess is taken off over a while before and after, too:
+    the largest excess within reach, smoothed by a kernel that reaches no further, is nowhere less
+    than the excess itself.
+    """
+    above = _eased(np.maximum(curves - high, 0.0), fps)
+    below = _eased(np.maximum(low - curves, 0.0), fps)
+    return np.clip(curves - above + below, low, high)
+
+
+def _eased(excess: Array, fps: float) -> Array:
+    """Smooth curves (frames, channels) that are nowhere below ``excess``."""
+    from scipy.ndimage import convolve1d, maximum_filter1d
+
+    beyond = np.flatnonzero(excess.any(axis=0))
+    reach = max(1, round(LIMIT_REACH_S * fps))
+    if not len(beyond):
+        return excess
+    kernel = np.hanning(2 * reach + 3)[1:-1]
+    largest = maximum_filter1d(excess[:, beyond], 2 * reach + 1, axis=0, mode="nearest")
+    eased = np.zeros_like(excess)
+    eased[:, beyond] = convolve1d(largest, kernel / kernel.sum(), axis=0, mode="nearest")
+    return eased
 
 
 def _linear_weights(offset: Array, count: int) -> Array:

@@ -79,7 +79,7 @@ class LibraryClip:
 
 @dataclass(frozen=True)
 class Left:
-    """A clip that was left out of a library, and why."""
+    """A clip that was left out, and why."""
 
     path: str
     reason: str
@@ -87,11 +87,16 @@ class Left:
 
 @dataclass(frozen=True, eq=False)
 class MotionLibrary:
-    """Clips in order of their names, and how they were cut."""
+    """Clips in order of their names, and how they were cut.
+
+    ``left_out`` could not be used when the library was built; ``damaged`` are prims that could not
+    be read from it.
+    """
 
     clips: tuple[LibraryClip, ...]
     segmentation: Segmentation = field(default_factory=Segmentation)
     left_out: tuple[Left, ...] = ()
+    damaged: tuple[Left, ...] = ()
 
     @property
     def minutes(self) -> float:

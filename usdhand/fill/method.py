@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -11,7 +12,7 @@ import numpy as np
 from usdhand.anatomy import SIDES, Channels, Hands, Side
 from usdhand.anatomy.channels import all_channels
 from usdhand.errors import InputError, UsageError
-from usdhand.fill.arm import arm_motion
+from usdhand.fill.arm import ArmMotion, arm_motion
 from usdhand.fill.assemble import Piece, join, limited, soften_seams
 from usdhand.fill.candidates import (
     Candidate,
@@ -70,7 +71,8 @@ def fill(
     if len(body) < 2:
         raise InputError(f"{body.name} is a single frame; there is no motion to find fingers for.")
     channels = hands.encode(body)
-    own = same_motion(library, body, hands, content_hash)
+    arms = {s: at_arm_rate(arm_motion(body, hands, s), body.fps) for s in hands.frames}
+    own = same_motion(library, arms, content_hash)
     moving = tuple(s for s in sides if s in hands.frames and _moves(channels, hands, s))
     kept = () if replace_motion else moving
     open_sides: Part = tuple(s for s in sides if s in hands.frames and s not in kept)
@@ -79,40 +81,54 @@ def fill(
             f"The fingers of {body.name} already move ({' and '.join(kept) or 'no hand'}); "
             "ask for it to be replaced if that is meant (--replace)."
         )
-    usable = {s: _usable_clips(library, (s,), hands, own) for s in open_sides}
-    wanted: Part = tuple(s for s in open_sides if usable[s])
+    joints = {s: _shared_joints(library, hands, s, own) for s in open_sides}
+    wanted: Part = tuple(s for s in open_sides if joints[s])
     if not wanted:
         raise InputError(_why_none(library, body, hands, open_sides, own))
     together = settings.couple and len(wanted) == 2
     parts: list[Part] = [wanted] if together else [(s,) for s in wanted]
-    if together and not _usable_clips(library, wanted, hands, own):
+    if together and not _usable_clips(library, joints, wanted, own):
         raise InputError(
             "No clip of the library has both hands; fill each hand on its own (without --couple)."
         )
     filled = tuple(
         _fill_part(
-            body,
-            hands,
+            body.fps,
+            len(body),
+            [arms[side] for side in part],
+            [joints[side] for side in part],
             library,
             (spaces or {}).get(part) or space_for(library, part, settings),
             settings,
-            _usable_clips(library, part, hands, own),
+            _usable_clips(library, joints, part, own),
         )
         for part in parts
     )
     column = {name: i for i, name in enumerate(channels.names)}
+    changed = [
+        int(joint)
+        for side in wanted
+        for name, joint in zip(hands.frames[side].names, hands.frames[side].joints, strict=True)
+        if name in joints[side]
+    ]
     clips = []
     for number in range(max(len(done.alternatives) for done in filled)):
         values = channels.values.copy()
         for done in filled:
             alternative = done.alternatives[min(number, len(done.alternatives) - 1)]
             values[:, [column[n] for n in alternative.names]] = alternative.curves
-        clips.append(hands.decode(Channels(channels.names, values), body))
+        rotations = body.rotations.copy()  # all other joints to the bit
+        made = hands.decode(Channels(channels.names, values), body).rotations
+        rotations[:, changed] = made[:, changed]
+        clips.append(body.with_rotations(rotations))
+    missing = {s: tuple(j for j in hands.frames[s].names if j not in joints[s]) for s in wanted}
     return Filled(
         tuple(clips),
         filled,
         kept,
         tuple(s for s in open_sides if s not in wanted),
+        tuple(sorted(changed)),
+        {side: names for side, names in missing.items() if names},
         tuple(library.clips[i].name for i in own),
         settings,
     )
@@ -127,10 +143,26 @@ def _moves(channels: Channels, hands: Hands, side: Side) -> bool:
     return fingers_moving(channels.select(all_channels(side, hands.frames[side].names)).values)
 
 
+def _shared_joints(
+    library: MotionLibrary, hands: Hands, side: Side, own: Sequence[int]
+) -> tuple[str, ...]:
+    """The body's hand joints that a clip has which is not its own: the most, of the most clips."""
+    body = hands.frames[side].names
+    counts = Counter(
+        tuple(joint for joint in body if joint in clip.hands[side].joints)
+        for i, clip in enumerate(library.clips)
+        if i not in own and side in clip.hands and clip.hands[side].segments
+    )
+    return max(counts, key=lambda joints: (len(joints), counts[joints]), default=())
+
+
 def _usable_clips(
-    library: MotionLibrary, part: Part, hands: Hands, own: Sequence[int]
+    library: MotionLibrary,
+    joints: Mapping[Side, tuple[str, ...]],
+    part: Part,
+    own: Sequence[int],
 ) -> frozenset[int]:
-    """Library clips with segments and all the hand joints of the body that are not its own."""
+    """Library clips with segments and these hand joints that are not the body's own."""
     return frozenset(
         i
         for i, clip in enumerate(library.clips)
@@ -138,7 +170,7 @@ def _usable_clips(
         and all(
             side in clip.hands
             and clip.hands[side].segments
-            and set(hands.frames[side].names) <= set(clip.hands[side].joints)
+            and set(joints[side]) <= set(clip.hands[side].joints)
             for side in part
         )
     )
@@ -149,28 +181,28 @@ def _why_none(
 ) -> str:
     if not library.clips:
         return "The library is empty; build it from clips with body and fingers."
-    if any(_usable_clips(library, (side,), hands, ()) for side in sides):
+    if any(_shared_joints(library, hands, side, ()) for side in sides):
         names = ", ".join(library.clips[i].name for i in own)
         return f"The library has nothing but {body.name} itself ({names}); add other motion."
     joints = "; ".join(f"{side}: {', '.join(hands.frames[side].names)}" for side in sides)
-    return f"No clip of the library has the hand joints of {body.name} ({joints})."
+    return f"No clip of the library has any hand joint of {body.name} ({joints})."
 
 
 def _fill_part(
-    body: Clip,
-    hands: Hands,
+    fps: float,
+    frames: int,
+    arms: Sequence[ArmMotion],
+    joints: Sequence[tuple[str, ...]],
     library: MotionLibrary,
     space: SearchSpace,
     settings: FillSettings,
     usable: frozenset[int],
 ) -> FilledPart:
     part = space.part
-    joints = [hands.frames[side].names for side in part]
     names = tuple(
         n for side, own in zip(part, joints, strict=True) for n in all_channels(side, own)
     )
-    arms = [at_arm_rate(arm_motion(body, hands, side), body.fps) for side in part]
-    cut = part_segments(arms, _for_rate(space.segmentation, body.fps))
+    cut = part_segments(arms, _for_rate(space.segmentation, fps))
     rows = part_rows(arms, space.metric)
     found = find_candidates(
         [rows[a : b + 1] for a, b in cut],
@@ -180,12 +212,12 @@ def _fill_part(
         [i for i in range(len(library.clips)) if i not in usable],
     )
     sources = finger_sources(library, part, joints, usable)
-    borders = _body_frames(cut, body)
+    borders = _body_frames(cut, fps, frames)
     curves = [
-        finger_curves(candidates, space, sources, np.arange(b - a + 1) / body.fps)
+        finger_curves(candidates, space, sources, np.arange(b - a + 1) / fps)
         for (a, b), candidates in zip(borders, found, strict=True)
     ]
-    network = graph(found, curves, names, body.fps, settings)
+    network = graph(found, curves, names, fps, settings)
     low, high = channel_limits(library, part, joints)
     alternatives = []
     for path in choose(network, settings):
@@ -198,11 +230,12 @@ def _fill_part(
         joined = join(pieces, settings.blend)
         seams = tuple(piece.first for piece in pieces[1:])
         if settings.blend == "smooth":
-            joined = soften_seams(joined, seams, body.fps)
+            joined = soften_seams(joined, seams, fps)
         choices = _choices(path, network, found, cut)
-        fingers = limited(joined, low, high)
+        fingers = limited(joined, low, high, fps)
         alternatives.append(Alternative(names, fingers, choices, path.cost, seams))
-    return FilledPart(part, space, tuple(alternatives))
+    candidates = int(np.isin(space.clips, list(usable)).sum())
+    return FilledPart(part, tuple(joints), space, candidates, tuple(alternatives))
 
 
 def _choices(
@@ -234,7 +267,7 @@ def _for_rate(segmentation: Segmentation, fps: float) -> Segmentation:
     return replace(segmentation, shortest=shortest, longest=max(segmentation.longest, 2 * shortest))
 
 
-def _body_frames(cut: Sequence[tuple[int, int]], body: Clip) -> list[tuple[int, int]]:
+def _body_frames(cut: Sequence[tuple[int, int]], fps: float, frames: int) -> list[tuple[int, int]]:
     """Body frames of segments that were cut at `ARM_FPS`; the last one takes what is left."""
-    borders = [round(a / ARM_FPS * body.fps) for a, _ in cut] + [len(body) - 1]
+    borders = [round(a / ARM_FPS * fps) for a, _ in cut] + [frames - 1]
     return list(pairwise(borders))

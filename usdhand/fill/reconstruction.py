@@ -14,7 +14,7 @@ from usdhand.fill.assemble import Piece, join
 from usdhand.fill.candidates import Candidate, SearchSpace, finger_curves, finger_sources
 from usdhand.fill.library import MotionLibrary, Part
 from usdhand.fill.method import fill
-from usdhand.fill.results import Alternative, Choice, Filled
+from usdhand.fill.results import Choice, Filled, FilledPart
 from usdhand.fill.settings import FillSettings
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
@@ -65,9 +65,7 @@ def reconstruction_errors(
         error
         for part in filled.parts
         for side in part.part
-        for error in _hand_errors(
-            clip, hands, library, filled, part.alternatives[0], part.space, side
-        )
+        for error in _hand_errors(clip, hands, library, filled, part, side)
     ]
 
 
@@ -76,11 +74,11 @@ def _hand_errors(
     hands: Hands,
     library: MotionLibrary,
     filled: Filled,
-    chosen: Alternative,
-    space: SearchSpace,
+    part: FilledPart,
     side: Side,
 ) -> list[HandError]:
-    joints = hands.frames[side].names
+    chosen, space = part.alternatives[0], part.space
+    joints = part.joints[part.part.index(side)]
     names = all_channels(side, joints)
     columns = [chosen.names.index(n) for n in names]
     truth = hands.encode(clip).select(names).values
@@ -124,8 +122,11 @@ def _error(
 ) -> HandError:
     frames, hand = hands.frames[side], hands.character.hands[side]
     only = replace(hands, frames={side: frames})
-    other = only.decode(Channels(names, np.array(curves)), clip)
-    angle = rot.angle_between(clip.rotations[:, frames.joints], other.rotations[:, frames.joints])
+    other = only.decode(only.encode(clip).replaced(Channels(names, np.array(curves))), clip)
+    joints = [
+        j for n, j in zip(frames.names, frames.joints, strict=True) if _channel(side, n) in names
+    ]
+    angle = rot.angle_between(clip.rotations[:, joints], other.rotations[:, joints])
     apart = fingertips(other, hand, frames) - fingertips(clip, hand, frames)
     jerk = np.diff(curves, n=3, axis=0) * clip.fps**3
     return HandError(
@@ -137,6 +138,10 @@ def _error(
         float(np.sqrt(np.mean(jerk**2))) if len(jerk) else 0.0,
         len(clip),
     )
+
+
+def _channel(side: Side, joint: str) -> str:
+    return all_channels(side, (joint,))[0]
 
 
 def _rest_curves(clip: Clip, hands: Hands, names: tuple[str, ...]) -> Array:

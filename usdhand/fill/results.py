@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from usdhand.anatomy import Side
@@ -46,10 +47,15 @@ class Alternative:
 
 @dataclass(frozen=True, eq=False)
 class FilledPart:
-    """A part of the body and the ways in which it was filled, best first."""
+    """A part of the body and the ways in which it was filled, best first.
+
+    ``joints`` are those that were filled, a hand each; ``usable`` segments could be chosen from.
+    """
 
     part: Part
+    joints: tuple[tuple[str, ...], ...]
     space: SearchSpace
+    usable: int
     alternatives: tuple[Alternative, ...]
 
 
@@ -62,6 +68,8 @@ class Filled:
     clips : an alternative each, best first
     kept : hands whose own finger motion was kept, since it moves
     without : hands that the library has no motion for
+    changed : joints of the skeleton that were filled
+    missing : hand joints that the library has no motion for; they were kept
     left_out : names of library clips that were not used, since they are the body's own
     """
 
@@ -69,5 +77,7 @@ class Filled:
     parts: tuple[FilledPart, ...]
     kept: tuple[Side, ...] = ()
     without: tuple[Side, ...] = ()
+    changed: tuple[int, ...] = ()
+    missing: Mapping[Side, tuple[str, ...]] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     settings: FillSettings = field(default_factory=FillSettings)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from usdhand.anatomy import Hands
-from usdhand.fill.arm import arm_motion
-from usdhand.fill.library import ARM_FPS, MotionLibrary, at_arm_rate
-from usdhand.motion import Clip
+from usdhand.anatomy import Side
+from usdhand.fill.arm import ArmMotion
+from usdhand.fill.library import ARM_FPS, MotionLibrary
 from usdhand.motion.rotations import Array
 
 # Two takes are one performance if the wrists' paths are this alike, but for a small offset.
@@ -19,16 +20,13 @@ SMALLEST_PATH_CM = 5.0
 
 
 def same_motion(
-    library: MotionLibrary, body: Clip, hands: Hands, content_hash: str | None
+    library: MotionLibrary, arms: Mapping[Side, ArmMotion], content_hash: str | None
 ) -> list[int]:
-    """Clips with the same content, or with the same arm motion as the body.
+    """Clips with the same content, or with the same motion as a body's ``arms`` at `ARM_FPS`.
 
     Taking fingers from them would be copying the answer, which is what nobody wants to measure.
     """
-    paths = {
-        side: at_arm_rate(arm_motion(body, hands, side), body.fps).hips_position
-        for side in hands.frames
-    }
+    paths = {side: arm.hips_position for side, arm in arms.items()}
     return [
         i
         for i, clip in enumerate(library.clips)

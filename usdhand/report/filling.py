@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from usdhand.anatomy import SIDES, Side
+from usdhand.anatomy.hand import SIDE_PREFIX
 from usdhand.fill import Filled, MotionLibrary
 from usdhand.fill.agreement import Agreement
 from usdhand.fill.candidates import Candidate, SearchSpace
@@ -38,6 +39,7 @@ def library_result(library: MotionLibrary, gone: Sequence[str] = ()) -> dict[str
             "longest_s": cutting.longest,
         },
         "left_out": [{"path": x.path, "reason": x.reason} for x in library.left_out],
+        "damaged": [{"path": x.path, "reason": x.reason} for x in library.damaged],
         "gone": list(gone),
     }
 
@@ -51,31 +53,43 @@ def fill_result(filled: Filled, library: MotionLibrary, body: Clip) -> dict[str,
             hands[side] = {
                 "segments": [_choice_data(c, part.space, library) for c in best.choices],
                 "cost": rounded(best.cost),
-                "seams": _seams(best, body.fps)
+                "seams": _seams(best, side, body.fps)
                 | {"max_acceleration_captured_deg_s2": _captured(part, side, library, body.fps)},
             }
     most = max(len(p.alternatives) for p in filled.parts)
     return {
         "hands": hands,
-        "alternatives": [
-            {
-                "cost": rounded(
-                    sum(p.alternatives[min(i, len(p.alternatives) - 1)].cost for p in filled.parts)
-                ),
-                "clips": {
-                    side: [_clip_name(c, p.space, library) for c in a.choices]
-                    for p in filled.parts
-                    for a in [p.alternatives[min(i, len(p.alternatives) - 1)]]
-                    for side in p.part
-                },
-            }
-            for i in range(most)
-        ],
+        "alternatives": [_alternative_data(filled, i, library, body.fps) for i in range(most)],
         "kept": list(filled.kept),
         "without": list(filled.without),
+        "missing": {side: list(joints) for side, joints in filled.missing.items()},
         "left_out": list(filled.left_out),
         "fps": rounded(body.fps),
         "frames": len(body),
+    }
+
+
+def _alternative_data(
+    filled: Filled, number: int, library: MotionLibrary, fps: float
+) -> dict[str, Any]:
+    """One of the results: what it costs, and the piece of the library for each segment."""
+    parts = [
+        (part, part.alternatives[min(number, len(part.alternatives) - 1)]) for part in filled.parts
+    ]
+    hands = [(side, part.space, own) for part, own in parts for side in part.part]
+    return {
+        "cost": rounded(sum(own.cost for _, own in parts)),
+        "clips": {
+            side: [_clip_name(c, space, library) for c in own.choices] for side, space, own in hands
+        },
+        "hands": {
+            side: {
+                "segments": [_piece_data(c, space, library) for c in own.choices],
+                "cost": rounded(own.cost),
+                "seams": _seams(own, side, fps),
+            }
+            for side, space, own in hands
+        },
     }
 
 
@@ -127,7 +141,7 @@ def _mean_error(errors: Sequence[HandError], side: str, method: str) -> dict[str
     }
 
 
-def _choice_data(choice: Choice, space: SearchSpace, library: MotionLibrary) -> dict[str, Any]:
+def _piece_data(choice: Choice, space: SearchSpace, library: MotionLibrary) -> dict[str, Any]:
     chosen = choice.candidates[choice.chosen]
     return {
         "start": rounded(choice.start),
@@ -136,6 +150,11 @@ def _choice_data(choice: Choice, space: SearchSpace, library: MotionLibrary) -> 
         "transition_cost": rounded(choice.transition_cost),
         "node_cost": rounded(choice.node_cost),
         "stretched": rounded(chosen.stretch),
+    }
+
+
+def _choice_data(choice: Choice, space: SearchSpace, library: MotionLibrary) -> dict[str, Any]:
+    return _piece_data(choice, space, library) | {
         "candidates": [_candidate_data(c, space, library) for c in choice.candidates],
     }
 
@@ -155,9 +174,10 @@ def _clip_name(choice: Choice, space: SearchSpace, library: MotionLibrary) -> st
     return str(library.clips[space.clips[choice.candidates[choice.chosen].segment]].name)
 
 
-def _seams(alternative: Alternative, fps: float) -> dict[str, Any]:
-    """Angular acceleration at the seams beside that of everything in between."""
-    acceleration = np.abs(np.diff(alternative.curves, n=2, axis=0)) * fps**2
+def _seams(alternative: Alternative, side: Side, fps: float) -> dict[str, Any]:
+    """Angular acceleration of a hand at the seams beside that of everything in between."""
+    own = [n.startswith(SIDE_PREFIX[side]) for n in alternative.names]
+    acceleration = np.abs(np.diff(alternative.curves[:, own], n=2, axis=0)) * fps**2
     at_seams = np.zeros(len(acceleration), dtype=bool)
     for seam in alternative.seams:
         at_seams[max(seam - 2, 0) : seam + 1] = True

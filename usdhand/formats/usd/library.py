@@ -7,15 +7,16 @@ can move), what is said of it, and packed arrays of what search and assembly nee
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from pxr import Sdf, Tf, Usd, Vt
 
-from usdhand.anatomy import SIDES, Side
-from usdhand.errors import InputError, UsdHandError
+from usdhand.anatomy import HAND_JOINTS, SIDES, Side
+from usdhand.errors import InputError, UsageError, UsdHandError
 from usdhand.fill.library import (
     ARM_FPS,
     ARM_WIDTH,
@@ -29,7 +30,7 @@ from usdhand.fill.library import (
 from usdhand.fill.segment import Segmentation
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.formats.usd.stage import open_stage
+from usdhand.formats.usd.stage import open_stage, usd_diagnostics
 from usdhand.formats.usd.write import save_layer
 
 VERSION = 1
@@ -82,10 +83,9 @@ def write_library(library: MotionLibrary, output: Path, *, force: bool = False) 
 def is_library(path: Path) -> bool:
     """Whether a file is a motion library, of any version."""
     try:
-        open_stage(path)
+        stage = _open(path)
     except UsdHandError:
         return False
-    stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
     root = stage.GetPrimAtPath(ROOT)
     return bool(root) and root.GetAttribute("usdhand:libraryVersion").HasValue()
 
@@ -93,14 +93,16 @@ def is_library(path: Path) -> bool:
 def read_library(path: str | Path) -> MotionLibrary:
     """Read a library, clips in order of their names.
 
+    What is under ``/Library/Clips`` and cannot be used, since someone edited or damaged it, is
+    left out and listed in ``damaged``.
+
     Raises
     ------
     InputError
-        if the file is no library, of another version, or a clip in it is damaged.
+        if the file is no library, of another version, or nothing in it can be used.
     """
     path = Path(path)
-    open_stage(path)  # says what is wrong with a file that is no USD
-    stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
+    stage = _open(path)
     root = stage.GetPrimAtPath(ROOT)
     version = root.GetAttribute("usdhand:libraryVersion").Get() if root else None
     if version != VERSION:
@@ -108,27 +110,54 @@ def read_library(path: str | Path) -> MotionLibrary:
         raise InputError(
             f"{path} is {found}; 'usdhand library build CLIP... -o LIBRARY' makes one."
         )
-
-    def setting(name: str, default: float) -> float:
-        value = root.GetAttribute(f"usdhand:segmentation:{name}").Get()
-        return default if value is None else float(value)
-
-    usual = Segmentation()
-    segmentation = Segmentation(
-        setting("speed", usual.speed),
-        setting("shortest", usual.shortest),
-        setting("longest", usual.longest),
-        setting("smoothing", usual.smoothing),
-    )
-    clips = stage.GetPrimAtPath(CLIPS)
-    found_clips = [_read_clip(prim, path) for prim in clips.GetChildren()] if clips else []
+    clips: list[LibraryClip] = []
+    damaged: list[Left] = []
+    parent = stage.GetPrimAtPath(CLIPS)
+    for prim in parent.GetChildren() if parent else ():
+        try:
+            clips.append(_read_clip(prim))
+        except _DamagedError as error:
+            damaged.append(Left(str(prim.GetPath()), str(error)))
+    if damaged and not clips:
+        raise InputError(
+            f"{path}: none of its {len(damaged)} clips can be used ({damaged[0].path}: "
+            f"{damaged[0].reason}); build the library again."
+        )
     left = stage.GetPrimAtPath(LEFT_OUT)
     left_out = [
         Left(str(_get(p, "path", "")), str(_get(p, "reason", "")))
         for p in (left.GetChildren() if left else ())
     ]
-    ordered = tuple(sorted(found_clips, key=lambda c: c.name))
-    return MotionLibrary(ordered, segmentation, tuple(left_out))
+    ordered = tuple(sorted(clips, key=lambda c: c.name))
+    return MotionLibrary(ordered, _segmentation(root, path), tuple(left_out), tuple(damaged))
+
+
+class _DamagedError(Exception):
+    """What is wrong with the prim of a clip."""
+
+
+def _open(path: Path) -> Usd.Stage:
+    """A library's stage without its clips' files, which may be many or gone."""
+    stage = None
+    if path.is_file() and path.suffix.lower() in USD_SUFFIXES:
+        with usd_diagnostics():
+            try:
+                stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
+            except Tf.ErrorException:
+                stage = None
+    if stage is None:
+        open_stage(path)  # says what is wrong
+        raise InputError(f"{path}: USD cannot read this file.")
+    return stage
+
+
+def _segmentation(root: Usd.Prim, path: Path) -> Segmentation:
+    names = [f.name for f in fields(Segmentation)]
+    values = {name: _get(root, f"segmentation:{name}") for name in names}
+    try:
+        return Segmentation(**{n: float(v) for n, v in values.items() if v is not None})
+    except (UsageError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: usdhand:segmentation is damaged ({error}).") from error
 
 
 def relative_path(path: Path, library: Path) -> str:
@@ -164,9 +193,10 @@ def _write_clip(layer: Sdf.Layer, clip: LibraryClip, name: str) -> None:
             "file": (_TYPES.Asset, Sdf.AssetPath(clip.path)),
         },
     )
-    motion = _prim(layer, f"{prim.path}/Motion", "")
-    first = Sdf.Path(clip.skel).GetPrefixes()[0] if clip.skel else Sdf.Path.emptyPath
-    motion.payloadList.prependedItems = [Sdf.Payload(clip.path, first)]
+    if Path(clip.path).suffix.lower() in USD_SUFFIXES:
+        motion = _prim(layer, f"{prim.path}/Motion", "")
+        first = Sdf.Path(clip.skel).GetPrefixes()[0] if clip.skel else Sdf.Path.emptyPath
+        motion.payloadList.prependedItems = [Sdf.Payload(clip.path, first)]
     for side, hand in clip.hands.items():
         segments = np.array(hand.segments, dtype=np.int32).reshape(-1, 2)
         _set_all(
@@ -180,45 +210,73 @@ def _write_clip(layer: Sdf.Layer, clip: LibraryClip, name: str) -> None:
         )
 
 
-def _read_clip(prim: Usd.Prim, path: Path) -> LibraryClip:
-    where = f"{path}: {prim.GetPath()}"
+def _read_clip(prim: Usd.Prim) -> LibraryClip:
+    """Read what a prim says of a clip.
+
+    Raises
+    ------
+    _DamagedError
+        if it is no clip, or does not fit together.
+    """
 
     def need(name: str) -> Any:
         value = _get(prim, name)
         if value is None:
-            raise InputError(f"{where} has no usdhand:{name}; build the library again.")
+            raise _DamagedError(f"it has no usdhand:{name}")
         return value
 
-    hands: dict[Side, LibraryHand] = {}
-    for side in SIDES:
-        joints = _get(prim, f"{side}:joints")
-        if joints is None:
-            continue
-        arm = np.array(need(f"{side}:arm"), dtype=np.float64)
-        fingers = np.array(need(f"{side}:fingers"), dtype=np.float64)
-        segments = np.array(need(f"{side}:segments")).reshape(-1, 2)
-        if arm.size % ARM_WIDTH or not len(joints) or fingers.size % (3 * len(joints)):
-            raise InputError(f"{where}: the {side} arrays do not fit; build the library again.")
-        arm = arm.reshape(-1, ARM_WIDTH)
-        if len(segments) and (segments.min() < 0 or segments.max() >= len(arm)):
-            raise InputError(f"{where}: the {side} segments do not fit; build the library again.")
-        hands[side] = LibraryHand(
-            unpack_arm(arm),
-            tuple(str(j) for j in joints),
-            fingers.reshape(-1, 3 * len(joints)),
-            tuple((int(a), int(b)) for a, b in segments),
-        )
+    def positive(name: str) -> float:
+        value = need(name)
+        if not isinstance(value, (int, float)) or not 0.0 < value < np.inf:
+            raise _DamagedError(f"its usdhand:{name} is {value}")
+        return float(value)
+
+    name, content, file = str(need("name")), str(need("contentHash")), need("file")
+    try:
+        hands = {
+            side: _read_hand(side, need)
+            for side in SIDES
+            if _get(prim, f"{side}:joints") is not None
+        }
+    except (TypeError, ValueError) as error:
+        raise _DamagedError(f"its arrays have the wrong type ({error})") from error
+    if not hands:
+        raise _DamagedError("it has no hand")
     return LibraryClip(
-        str(need("name")),
-        str(need("file").path),
+        name,
+        str(file.path) if isinstance(file, Sdf.AssetPath) else str(file),
         str(_get(prim, "skeleton", "")),
         str(_get(prim, "label", "")),
         str(_get(prim, "actor", "")),
-        float(need("height")),
-        float(need("fps")),
-        float(need("duration")),
-        str(need("contentHash")),
+        positive("height"),
+        positive("fps"),
+        positive("duration"),
+        content,
         cast(Mapping[Side, LibraryHand], hands),
+    )
+
+
+def _read_hand(side: Side, need: Callable[[str], Any]) -> LibraryHand:
+    joints = tuple(str(j) for j in need(f"{side}:joints"))
+    arm = np.array(need(f"{side}:arm"), dtype=np.float64)
+    fingers = np.array(need(f"{side}:fingers"), dtype=np.float64)
+    segments = np.array(need(f"{side}:segments"), dtype=np.intp).reshape(-1, 2)
+    known = joints and set(joints) <= set(HAND_JOINTS) and len(set(joints)) == len(joints)
+    if not known or not arm.size or arm.size % ARM_WIDTH:
+        raise _DamagedError(f"its {side} arrays do not fit")
+    arm, width = arm.reshape(-1, ARM_WIDTH), 3 * len(joints)
+    if not fingers.size or fingers.size % width:
+        raise _DamagedError(f"its {side} arrays do not fit")
+    if not (np.isfinite(arm).all() and np.isfinite(fingers).all()):
+        raise _DamagedError(f"its {side} arrays have values that are no numbers")
+    inside = (segments >= 0) & (segments < len(arm))
+    if not inside.all() or (segments[:, 0] >= segments[:, 1]).any():
+        raise _DamagedError(f"its {side} segments do not fit")
+    return LibraryHand(
+        unpack_arm(arm),
+        joints,
+        fingers.reshape(-1, width),
+        tuple((int(a), int(b)) for a, b in segments),
     )
 
 

@@ -107,6 +107,7 @@ def _flattened(layer: Sdf.Layer, output: Path) -> Sdf.Layer:
         _export(layer, beside)
         stage = Usd.Stage.Open(str(beside))
         flat = stage.Flatten(addSourceFileComment=False)
+        _keep_variants(layer, flat)
         del stage
     finally:
         beside.unlink(missing_ok=True)
@@ -117,6 +118,20 @@ def _flattened(layer: Sdf.Layer, output: Path) -> Sdf.Layer:
     # Flatten makes all paths absolute, and files that move together would lose each other.
     UsdUtils.ModifyAssetPaths(flat, relative)
     return flat
+
+
+def _keep_variants(layer: Sdf.Layer, flat: Sdf.Layer) -> None:
+    """Put animations that have variants in ``layer`` into what was flattened, which has none."""
+    found: list[Sdf.Path] = []
+
+    def visit(path: Sdf.Path) -> None:
+        prim = layer.GetPrimAtPath(path) if path.IsPrimPath() else None
+        if prim and prim.typeName == "SkelAnimation" and len(prim.variantSets):
+            found.append(path)
+
+    layer.Traverse(Sdf.Path.absoluteRootPath, visit)
+    for path in found:
+        Sdf.CopySpec(layer, path, flat, path)
 
 
 def _package(layer: Sdf.Layer, temporary: Path, output: Path) -> None:
