@@ -247,7 +247,10 @@ def bind_animation(layer: Sdf.Layer, character: Character, animation: Sdf.Path) 
         schemas = Sdf.TokenListOp()
         schemas.prependedItems = ["SkelBindingAPI"]
         prim.SetInfo("apiSchemas", schemas)
-    relationship = Sdf.RelationshipSpec(prim, "skel:animationSource", custom=False)
+    # A layer that is a copy of a stage in memory has one.
+    relationship = prim.relationships.get("skel:animationSource") or Sdf.RelationshipSpec(
+        prim, "skel:animationSource", custom=False
+    )
     relationship.targetPathList.explicitItems = [animation]
 
 
