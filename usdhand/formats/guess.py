@@ -18,8 +18,8 @@ _LEG = re.compile(r"foot|ankle|toe|leg|knee|thigh|shin|calf", re.IGNORECASE)
 # The longest way from the root to an end of a human body, along its bones (hips to fingertips), and
 # what passes for one in a file that has no more to say. A part of a body may be far smaller.
 USUAL_REACH_CM = 150.0
-BODY_REACH_CM = (80.0, 280.0)
-PART_REACH_CM = (5.0, 280.0)
+BODY_REACH_CM = (80.0, 400.0)
+PART_REACH_CM = (5.0, 400.0)
 METRIC = {"centimetres": 1.0, "metres": 100.0, "millimetres": 0.1}
 OTHERS = {"decimetres": 10.0, "inches": 2.54, "units of the CMU library": 2.54 / 0.45}
 
@@ -44,7 +44,9 @@ def guess_units(
     least, most = BODY_REACH_CM if body else PART_REACH_CM
     fitting = {name: cm for name, cm in METRIC.items() if least <= reach * cm <= most}
     if not fitting and body:
-        near = sorted(OTHERS.items(), key=lambda item: abs(np.log(reach * item[1] / USUAL_REACH_CM)))
+        near = sorted(
+            OTHERS.items(), key=lambda item: abs(np.log(reach * item[1] / USUAL_REACH_CM))
+        )
         fitting = {name: cm for name, cm in near if least <= reach * cm <= most}
     if not fitting:
         message = (

@@ -63,7 +63,6 @@ class Hierarchy:
         """Number of values of a frame."""
         return sum(map(len, self.channels))
 
-
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Leaf names of the joints."""

@@ -166,9 +166,10 @@ def _positions(clip: Clip) -> Array:
 
 def _placed(clip: Clip, cm_per_unit: float, up: str) -> Clip:
     """In centimetres and Y up: what turns the axes is part of the roots' rotations."""
-    translations = clip.translations * cm_per_unit
+    translations = clip.translations if cm_per_unit == 1.0 else clip.translations * cm_per_unit
     if up == "Y":
         return replace(clip, translations=translations)
+    translations = translations.copy()
     roots = clip.skeleton.parents < 0
     axes = rot.from_matrix(Y_UP_FROM_Z_UP)
     rotations = clip.rotations.copy()
