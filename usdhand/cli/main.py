@@ -21,6 +21,7 @@ VERBS = {
     "evaluate": "Measure how well a library tells fingers from arms.",
     "compare": "Compare two motions: degrees, fingertips, smoothness, lag.",
     "convert": "Convert between USD, BVH, glTF and FBX; put fingers on other characters.",
+    "preview": "Make a page to look at clips with in a browser.",
     "check": "Check files with UsdValidation and rules of our own.",
     "schema": "Print the folder of the USD schema for PXR_PLUGINPATH_NAME.",
 }

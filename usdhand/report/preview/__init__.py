@@ -1,0 +1,1 @@
+"""A page that shows clips: one HTML file that needs nothing but a browser."""

@@ -1,0 +1,137 @@
+"""Rows of the timeline from the JSON reports of fill and splice, and from warps in files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from usdhand.anatomy import SIDES, Side
+from usdhand.errors import InputError
+from usdhand.motion.rotations import Array
+
+SHOWN_VERBS = ("fill", "splice")
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    """Read a JSON report of fill or splice.
+
+    Raises
+    ------
+    InputError
+        if it is none.
+    """
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    except ValueError as error:
+        raise InputError(f"{path}: no JSON ({error}).") from error
+    verb = report_verb(report)
+    if verb not in SHOWN_VERBS:
+        kind = f"a report of '{verb}'" if verb else "no report of usdhand"
+        raise InputError(
+            f"{path}: {kind}; the timeline shows those of {' and '.join(SHOWN_VERBS)}."
+        )
+    return dict(report)
+
+
+def report_verb(report: Any) -> str:
+    """Name of the verb that wrote a report, "" if none of ours did."""
+    schema = report.get("schema", "") if isinstance(report, dict) else ""
+    return schema[8:].partition("/")[0] if str(schema).startswith("usdhand.") else ""
+
+
+def report_rows(report: Mapping[str, Any], path: Path) -> list[dict[str, Any]]:
+    """Rows of the timeline: {side, label, spans, marks}; seconds from the body's first frame.
+
+    Raises
+    ------
+    InputError
+        if the report lacks what a report of its verb has.
+    """
+    try:
+        hands = [(side, report["hands"][side]) for side in SIDES if side in report["hands"]]
+        if report_verb(report) == "fill":
+            return [_fill_row(side, hand) for side, hand in hands]
+        return [row for side, hand in hands for row in _splice_rows(side, hand)]
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise InputError(f"{path}: the report is not complete ({error}).") from error
+
+
+def retiming(report: Mapping[str, Any]) -> tuple[str, dict[Side, Array]]:
+    """Hash of the hand clip of a splice, and its warps (n, 2) [body s, hand s]; "" for others."""
+    if report_verb(report) != "splice" or len(report.get("inputs", ())) < 2:
+        return "", {}
+    warps = {s: np.asarray(report["hands"][s]["warp"], float) for s in report["hands"]}
+    return str(report["inputs"][1]["sha256"]), {s: warps[s] for s in SIDES if s in warps}
+
+
+def warp_rows(warps: Mapping[Side, Array], fps: float) -> list[dict[str, Any]]:
+    """Rows with a mark at every full second of the hand clip, from warps without a report."""
+    found = []
+    for side, seconds in warps.items():
+        body = np.arange(len(seconds)) / fps
+        marks = _second_marks(body, seconds)
+        found.append({"side": side, "label": "seconds of hand clip", "spans": [], "marks": marks})
+    return found
+
+
+def _fill_row(side: str, hand: Mapping[str, Any]) -> dict[str, Any]:
+    spans = [
+        {
+            "start": float(s["start"]),
+            "end": float(s["end"]),
+            "label": str(s["clip"]),
+            "detail": f"{s['clip']} {s['clip_start']:.2f} to {s['clip_end']:.2f} s, "
+            f"cost {s['cost']:.1f}",
+        }
+        for s in hand["segments"]
+    ]
+    return {"side": side, "label": "segments", "spans": spans, "marks": []}
+
+
+def _splice_rows(side: str, hand: Mapping[str, Any]) -> list[dict[str, Any]]:
+    spans = [
+        {
+            "start": float(p["start"]),
+            "end": float(p["end"]),
+            "label": "holds" if p["quality"] is None else f"{p['quality']:.2f}",
+            "detail": "the hand holds"
+            if p["quality"] is None
+            else f"agreement {p['quality']:.2f}" + (", worth a pin" if p["look"] else ""),
+            "look": bool(p["look"]),
+        }
+        for p in hand["phases"]
+    ]
+    pins = [
+        {
+            "time": float(p["body"]),
+            "label": "\N{BLACK DOWN-POINTING TRIANGLE}",
+            "detail": f"pin: second {p['body']:.2f} shows {p['hand']:.2f} s of the hand clip",
+        }
+        for p in hand["pins"]
+    ]
+    warp = np.asarray(hand["warp"], float)
+    return [
+        {"side": side, "label": "phases", "spans": spans, "marks": pins},
+        {
+            "side": side,
+            "label": "seconds of hand clip",
+            "spans": [],
+            "marks": _second_marks(warp[:, 0], warp[:, 1]),
+        },
+    ]
+
+
+def _second_marks(body: Array, hand: Array) -> list[dict[str, Any]]:
+    """Where the hand clip has its full seconds: close together, it is played faster."""
+    full: Sequence[float] = np.arange(np.ceil(hand[0]), np.floor(hand[-1]) + 1).tolist()
+    times = np.interp(full, hand, body)
+    return [
+        {"time": float(t), "label": f"{s:g}", "detail": f"second {s:g} of the hand clip"}
+        for s, t in zip(full, times, strict=True)
+    ]

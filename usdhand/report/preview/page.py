@@ -1,0 +1,94 @@
+"""The page: template, style, viewer and data in one HTML file without any address in it."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from usdhand.errors import InputError
+from usdhand.version import __version__
+
+FIGURE_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
+# Modules by the names that they import each other by. The three.js files are as their authors
+# released them; see viewer/THREE-LICENSE.txt.
+MODULES = {
+    "three": "three.module.min.js",
+    "three-core": "three.core.min.js",
+    "orbit": "OrbitControls.js",
+    "data": "data.js",
+    "dom": "dom.js",
+    "playback": "playback.js",
+    "character": "character.js",
+    "stage": "stage.js",
+    "timeline": "timeline.js",
+    "curves": "curves.js",
+    "keys": "keys.js",
+    "main": "main.js",
+}
+# Relative addresses mean nothing in a page of one file.
+RENAMED = {'"./three.core.min.js"': '"three-core"'}
+# Characters that a data address can hold as they are, inside a JSON text inside HTML.
+READABLE = "!$&'()*+,-./:;=?@_~ []{}|^`>"
+
+
+def page(title: str, data: dict[str, Any], figures: Sequence[dict[str, str]] = ()) -> str:
+    """The whole page as text; it asks no address for anything."""
+    imports = {name: _module(file) for name, file in MODULES.items()}
+    fields = {
+        "title": html.escape(title),
+        "version": __version__,
+        "style": _text("page.css"),
+        "licence": html.escape(_text("THREE-LICENSE.txt")),
+        "imports": _json({"imports": imports}),
+        "data": _json({"title": title, "figures": list(figures), **data}),
+    }
+    text = _text("page.html")
+    for name, value in fields.items():
+        before, marker, after = text.partition(f"<!--{name}-->")
+        if not marker:
+            raise ValueError(f"page.html has no place for {name}")
+        text = f"{before}{value}{after}"
+    return text
+
+
+def figure(path: Path) -> dict[str, str]:
+    """A figure as an image inside the page: scripts in an SVG do not run there.
+
+    Raises
+    ------
+    InputError
+        if it is no SVG or PNG file.
+    """
+    kind = FIGURE_TYPES.get(path.suffix.lower())
+    if kind is None:
+        raise InputError(f"{path}: no figure; use one of {', '.join(FIGURE_TYPES)}.")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    source = f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+    return {"name": path.stem.replace("_", " "), "source": source}
+
+
+def _module(file: str) -> str:
+    text = _text(file)
+    for old, new in RENAMED.items():
+        text = text.replace(old, new)
+    return "data:text/javascript;charset=utf-8," + quote(text, safe=READABLE)
+
+
+def _text(file: str) -> str:
+    viewer = resources.files("usdhand.report.preview") / "viewer" / file
+    return viewer.read_text(encoding="utf-8")
+
+
+def _json(value: Any) -> str:
+    """JSON inside a script element: nothing in it can end the element."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
