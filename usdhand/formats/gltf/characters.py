@@ -123,7 +123,8 @@ def _together(tree: Tree, skins: list[Skin]) -> list[list[Skin]]:
         if skin.top >= 0:
             group = _merged(group, i, tops.setdefault(skin.top, i))
         # A skin below a joint of another one, as hair is below the head of the body.
-        above = next((n for n in (*tree.above(skin.top), skin.top)[::-1] if n in holder), None)
+        line = [skin.top, *reversed(tree.above(skin.top))]
+        above = next((node for node in line if node in holder and node not in skin.joints), None)
         if above is not None:
             group = _merged(group, i, holder[above])
     return [[skins[i] for i, g in enumerate(group) if g == name] for name in dict.fromkeys(group)]

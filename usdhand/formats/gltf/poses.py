@@ -29,10 +29,11 @@ def bind_matrices(
     place = {node: joint for joint, node in enumerate(character.nodes)}
     found: dict[int, Array] = {}
     problems = []
+    holder = int(tree.parents[character.nodes[0]])
     size = float(np.ptp(default[:, :3, 3], axis=0).max()) or 1.0
     for skin in sorted(character.skins, key=lambda skin: -len(skin.joints)):
         where = skin.element.where
-        bind = _in_world(document, tree, skin)
+        bind = _in_world(document, tree, skin, holder)
         if bind is None:
             message = "inverse bind matrices are missing or contradict the nodes: not used"
             problems.append(Problem("missing-bind", message, where))
@@ -60,8 +61,11 @@ def bind_matrices(
     return result, tuple(problems)
 
 
-def _in_world(document: Document, tree: Tree, skin: Skin) -> dict[int, Array] | None:
-    """World matrix of each joint of a skin in its bind pose; None where that cannot be told."""
+def _in_world(document: Document, tree: Tree, skin: Skin, holder: int) -> dict[int, Array] | None:
+    """World matrix of each joint of a skin in its bind pose; None where that cannot be told.
+
+    ``holder`` is the node above the character.
+    """
     accessors = document.lists["accessors"]
     index = skin.element.reference("inverseBindMatrices", len(accessors))
     if index is None:
@@ -77,13 +81,11 @@ def _in_world(document: Document, tree: Tree, skin: Skin) -> dict[int, Array] | 
     posed = tree.world[joints]
     # The matrices lead from the space of the mesh, which may be the world's, or that of the node
     # above the joints, or of the mesh; if none of them fits, the first joint is where its node is.
-    holder = int(tree.parents[skin.top]) if skin.top in joints else skin.top
-    spaces = [tree.world[node] for node in (holder, *skin.wearing) if node >= 0]
-    spaces.insert(1, np.eye(4))
+    spaces = [np.eye(4), *(tree.world[node] for node in (holder, *skin.wearing) if node >= 0)]
     first = int(np.flatnonzero(above < 0)[0])
     fitting = [bound for s in spaces if _fits(bound := s @ bind, posed, above)]
     if fitting:
-        best = max(fitting, key=lambda bound: _agreement(bound, posed, above))
+        best = min(fitting, key=lambda bound: _distance(bound, posed))
     else:
         best = posed[first] @ inverse[first] @ bind
         if not _fits(best, posed, above):
@@ -117,11 +119,10 @@ def _fits(bound: Array, posed: Array, above: NDArray[np.intp]) -> bool:
     return bool(np.median(np.abs(a[there] / b[there] - 1.0)) < SAME_LENGTH)
 
 
-def _agreement(bound: Array, posed: Array, above: NDArray[np.intp]) -> float:
-    a, b = _bones(bound, above), _bones(posed, above)
-    length = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
-    # Rounded, so that of equals the first one wins.
-    return round(float(np.sum(np.sum(a * b, axis=1) / np.maximum(length, 1e-12))), 6)
+def _distance(bound: Array, posed: Array) -> float:
+    """Mean distance of the joints from another pose."""
+    apart = np.linalg.norm(bound[:, :3, 3] - posed[:, :3, 3], axis=1).mean()
+    return float(f"{apart:.5g}")  # rounded, so that of equals the first one wins
 
 
 def _without_scale(matrices: Array) -> Array:

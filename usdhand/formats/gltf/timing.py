@@ -91,9 +91,11 @@ def find_timing(where: str, keys: list[Array]) -> Timing:
 
 def _distinct(keys: list[Array]) -> Array:
     times = np.unique(np.concatenate(keys))
-    # Two keys at nearly one time make a jump, they are no frames.
-    gap = np.maximum(1e-4, 2 * FLOAT32 * np.abs(times[1:]))
-    return times[np.concatenate([[True], np.diff(times) > gap])]
+    # Two keys at nearly one time make a jump, they are no frames; many such keys are ticks.
+    near = np.diff(times) <= np.maximum(1e-4, 2 * FLOAT32 * np.abs(times[1:]))
+    if (near[1:] & near[:-1]).any():
+        return times
+    return np.asarray(times[np.concatenate([[True], ~near])])
 
 
 def _steady(times: Array, rounding: float) -> Timing | None:
@@ -104,7 +106,7 @@ def _steady(times: Array, rounding: float) -> Timing | None:
     rate = steps / span
     if not SLOWEST * 0.999 <= rate <= FASTEST or _residual(times, rate) > UNEVEN / rate:
         return None
-    fps = min((*RATES, float(round(rate))), key=lambda common: abs(common - rate))
+    fps = min((*RATES, round(2 * rate) / 2), key=lambda common: abs(common - rate))
     off = abs(steps / fps - span)
     if off > max(DRIFT * span, MILLISECONDS):
         fps = rate
