@@ -419,3 +419,34 @@ def test_real_body_motion(library: Path, tmp_path: Path) -> None:
     body, out = bare_file(source, tmp_path / "maya.usdc"), tmp_path / "out.usdc"
     run("fill", body, "--library", library, "-o", out, "--add-fingers")
     run("check", out)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("name", ["jumping_jacks", "wave_hello"])
+def test_body_only_bvh(library: Path, tmp_path: Path, name: str) -> None:
+    """Motion without fingers of other formats: hands go on where the arms end, thumbs as theirs."""
+    body = shared_data("bvh", "animated-drawings", f"{name}.bvh")
+    out = tmp_path / "out.usda"
+    run("fill", body, "--library", library, "-o", out, "--add-fingers")
+    clip = api.read_clip(out)
+    hands = api.find_hands(clip)
+    for side in SIDES:
+        frames, hand = hands.frames[side], hands.character.hands[side]
+        assert len(frames.names) == 15
+        assert hand.elbow is not None
+        points = clip.skeleton.bind_positions
+        forearm = points[hand.wrist] - points[hand.elbow]
+        _, flexion, forward = palm(clip.skeleton, hands, side).T
+        assert forward @ forearm > 0.9 * np.linalg.norm(forearm)
+        [thumb] = [
+            j
+            for j, path in enumerate(clip.skeleton.joints)
+            if path.endswith(("Thumb1", "LThumb", "RThumb"))
+            and hand.wrist in clip.skeleton.ancestors(j)
+            and j not in hand.joints.values()
+        ]
+        ends = [*clip.skeleton.children[thumb], thumb]
+        stands = points[ends[0]] - points[hand.wrist]
+        radial = flexion if side == "right" else -flexion
+        assert radial @ stands >= 0
+    run("check", out)
