@@ -89,9 +89,10 @@ class Element:
             value = int(value)
         if not isinstance(value, int) or isinstance(value, bool):
             self.refuse("is no whole number")
-        if value < least or (below is not None and value >= below):
-            span = f"{least} or more" if below is None else f"at least {least} and below {below}"
-            self.refuse(f"is {_short(value)}; it must be {span}")
+        if value < least:
+            self.refuse(f"is {_short(value)}; the least there can be is {least}")
+        if below is not None and value >= below:
+            self.refuse(f"is {_short(value)}, but there are only {below}")
         return value
 
     def integer(self, key: str, default: int, least: int = 0) -> int:
