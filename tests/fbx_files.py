@@ -12,15 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 SECOND = 46186158000  # FBX ticks
+WEIGHTS = 0x0D050D05  # of both tangents, a third each, in ten thousandths
 ORDERS = ("xyz", "xzy", "yzx", "yxz", "zxy", "zyx")
 COMPONENTWISE, NORMAL, NO_PARENT_SCALE = 0, 1, 2  # FBX InheritType: RrSs, RSrs, Rrs
 Vector = tuple[float, float, float]
-Keys = Sequence[tuple[float, float]]  # seconds, value
+Keys = Sequence[tuple[float, ...]]  # seconds, value and, for smooth curves, slope a second
 
-PLURAL = {
+KINDS = {
     "RotationOffset": "Vector3D",
     "RotationPivot": "Vector3D",
     "ScalingOffset": "Vector3D",
@@ -35,7 +37,7 @@ PLURAL = {
 
 @dataclass(frozen=True)
 class Node:
-    """A node: its parent in the list (-1: the scene), its vectors, its keys by property and axis."""
+    """A node: its parent in the list (-1: the scene), vectors, keys by property and axis."""
 
     name: str
     parent: int = -1
@@ -51,8 +53,7 @@ class Node:
         found = np.array(self.vectors.get(name, start), dtype=float)
         for i, axis in enumerate("XYZ" if time is not None else ""):
             if (name, axis) in self.keys:
-                times, values = np.array(self.keys[name, axis]).T
-                found[i] = np.interp(time, times, values)
+                found[i] = _at(np.array(self.keys[name, axis]).T, time)
         return found
 
 
@@ -63,7 +64,6 @@ def write_fbx(
     takes: Mapping[str, tuple[float, float]] | None = None,
     settings: Mapping[str, float] | None = None,
     bind: Mapping[int, np.ndarray] | None = None,
-    version: int = 7400,
 ) -> Path:
     """Write nodes and their takes (name -> start and end in seconds)."""
     ids = itertools.count(1000)
@@ -75,22 +75,28 @@ def write_fbx(
         links.append(f'"OO",{model},{models[node.parent] if node.parent >= 0 else 0}')
         if node.kind != "Mesh":
             attribute = next(ids)
-            flags = "Null" if node.kind == "Null" else "Skeleton"
+            flags = "Skeleton" if node.kind == "LimbNode" else node.kind
             objects.append(
                 f'NodeAttribute: {attribute}, "NodeAttribute::", "{node.kind}" '
                 f'{{\n TypeFlags: "{flags}"\n }}'
             )
             links.append(f'"OO",{attribute},{model}')
     for i, (take, span) in enumerate((takes or {"Take 001": (0.0, 1.0)}).items()):
-        keyed = [(n.more_keys.get(take, {} if i else n.keys), m) for n, m in zip(nodes, models, strict=True)]
+        keyed = [
+            (n.more_keys.get(take, {} if i else n.keys), m)
+            for n, m in zip(nodes, models, strict=True)
+        ]
         _animation(take, span, keyed, objects, links, ids)
     if bind:
         poses = "\n".join(
-            f" PoseNode: {{\n Node: {models[i]}\n Matrix: *16 {{\n a: {_joined(m.T.ravel())}\n }}\n }}"
+            f" PoseNode: {{\n Node: {models[i]}\n"
+            f" Matrix: *16 {{\n a: {_joined(m.T.ravel())}\n }}\n }}"
             for i, m in bind.items()
         )
-        objects.append(f'Pose: {next(ids)}, "Pose::Bind", "BindPose" {{\n Type: "BindPose"\n{poses}\n }}')
-    text = f"; FBX {version / 1000:.1f}.0 project file\nFBXHeaderExtension: {{\n FBXVersion: {version}\n}}\n"
+        objects.append(
+            f'Pose: {next(ids)}, "Pose::Bind", "BindPose" {{\n Type: "BindPose"\n{poses}\n }}'
+        )
+    text = "; FBX 7.4.0 project file\nFBXHeaderExtension: {\n FBXVersion: 7400\n}\n"
     text += "GlobalSettings: {\n Properties70: {\n" + _settings(settings or {}) + " }\n}\n"
     text += "Objects: {\n" + "\n".join(objects) + "\n}\nConnections: {\n"
     text += "\n".join(f" C: {link}" for link in links) + "\n}\n"
@@ -101,6 +107,12 @@ def write_fbx(
 def positions(nodes: Sequence[Node], times: Iterable[float]) -> np.ndarray:
     """World positions (frames, nodes, 3) in the file's units."""
     return np.array([[m[:3, 3] for m in _globals(nodes, time)] for time in times])
+
+
+def _at(keys: np.ndarray, time: float) -> float:
+    if len(keys) == 2:
+        return float(np.interp(time, *keys))
+    return float(CubicHermiteSpline(*keys)(time))
 
 
 def _globals(nodes: Sequence[Node], time: float) -> list[np.ndarray]:
@@ -153,18 +165,21 @@ def _turn(node: Node, time: float) -> np.ndarray:
     def euler(name: str, order: int) -> np.ndarray:
         axes = ORDERS[order]
         angles = node.vector(name, time)
-        return Rotation.from_euler(axes, angles[["xyz".index(a) for a in axes]], degrees=True).as_matrix()
+        return Rotation.from_euler(
+            axes, angles[["xyz".index(a) for a in axes]], degrees=True
+        ).as_matrix()
 
     return euler("PreRotation", 0) @ euler("Lcl Rotation", node.order) @ euler("PostRotation", 0).T
 
 
 def _model(node: Node, model: int) -> str:
-    lines = [f' P: "{n}", "{PLURAL[n]}", "", "A",{_joined(v)}' for n, v in node.vectors.items()]
+    lines = [f' P: "{n}", "{KINDS[n]}", "", "A",{_joined(v)}' for n, v in node.vectors.items()]
     lines.append(' P: "RotationActive", "bool", "", "",1')
     lines.append(f' P: "RotationOrder", "enum", "", "",{node.order}')
     lines.append(f' P: "InheritType", "enum", "", "",{node.inherit}')
     body = "\n".join(lines)
-    return f'Model: {model}, "Model::{node.name}", "{node.kind}" {{\n Properties70: {{\n{body}\n }}\n }}'
+    head = f'Model: {model}, "Model::{node.name}", "{node.kind}"'
+    return f"{head} {{\n Properties70: {{\n{body}\n }}\n }}"
 
 
 def _animation(
@@ -197,15 +212,21 @@ def _animation(
 
 
 def _curve(curve: int, keys: Keys) -> str:
-    times = ",".join(str(round(time * SECOND)) for time, _ in keys)
-    values = _joined(value for _, value in keys)
-    n = len(keys)
-    return (
-        f'AnimationCurve: {curve}, "AnimCurve::", "" {{\n KeyVer: 4008\n'
-        f" KeyTime: *{n} {{\n a: {times}\n }}\n KeyValueFloat: *{n} {{\n a: {values}\n }}\n"
-        f" KeyAttrFlags: *1 {{\n a: 4\n }}\n KeyAttrDataFloat: *4 {{\n a: 0,0,0,0\n }}\n"
-        f" KeyAttrRefCount: *1 {{\n a: {n}\n }}\n }}"
+    smooth = len(keys[0]) == 3
+    slopes = [key[2] if smooth else 0.0 for key in keys]
+    tangents = [(out, into, WEIGHTS, 0) for out, into in zip(slopes, (*slopes[1:], 0.0), strict=True)]
+    arrays = {
+        "KeyTime": [round(key[0] * SECOND) for key in keys],
+        "KeyValueFloat": [key[1] for key in keys],
+        "KeyAttrFlags": [0x408 if smooth else 0x4] * len(keys),  # cubic by given tangents; linear
+        "KeyAttrDataFloat": [number for tangent in tangents for number in tangent],
+        "KeyAttrRefCount": [1] * len(keys),
+    }
+    body = "".join(
+        f" {name}: *{len(values)} {{\n a: {_joined(values)}\n }}\n"
+        for name, values in arrays.items()
     )
+    return f'AnimationCurve: {curve}, "AnimCurve::", "" {{\n KeyVer: 4008\n{body} }}'
 
 
 def _settings(chosen: Mapping[str, float]) -> str:
@@ -214,7 +235,9 @@ def _settings(chosen: Mapping[str, float]) -> str:
     values |= {"UnitScaleFactor": 1.0, "TimeMode": 6, **chosen}  # 6: 30 fps
     kinds = {True: '"double", "Number"', False: '"int", "Integer"'}
     return "".join(
-        f' P: "{n}", {kinds[isinstance(v, float)]}, "",{v}\n' for n, v in values.items() if v is not None
+        f' P: "{n}", {kinds[isinstance(v, float)]}, "",{v}\n'
+        for n, v in values.items()
+        if v is not None
     )
 
 
