@@ -122,8 +122,8 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
     """Find chest, hips, neck and head from the wrists, and which way the character looks.
 
     The chest is where both arms meet, or below that neck, the hips the spine joint nearest to where
-    the legs start.
-    Up runs from the feet to the chest (Y without legs); the toes say what is in front.
+    the legs start. Up runs from the feet to the hips, or without legs along the spine, or is Y; the
+    toes say what is in front.
     """
     up = np.array([0.0, 1.0, 0.0])
     chest = common_ancestor(skeleton, wrists) if len(wrists) > 1 else None
@@ -133,6 +133,8 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
     spine = (chest, *skeleton.ancestors(chest))
     joints, facing = {"chest": chest}, None
     legs = _legs(skeleton, points, spine, heights)
+    if len(spine) > 1 and np.ptp(points[[chest, spine[-1]]], axis=0).any():
+        up = unit(points[chest] - points[spine[-1]])
     if legs:
         tops = np.mean([points[leg[0]] for leg in legs], axis=0)
         joints["hips"] = min(spine[1:], key=lambda j: float(np.linalg.norm(points[j] - tops)))
@@ -140,7 +142,7 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
         facing = _toe_direction(points, legs, up)
     arms = {a for w in wrists for a in (w, *skeleton.ancestors(w))}
     shoulders = [points[c] for c in skeleton.children[chest] if c in arms]
-    if legs and float((np.mean(shoulders, axis=0) - points[chest]) @ up) < 0 and len(spine) > 2:
+    if float((np.mean(shoulders, axis=0) - points[chest]) @ up) < 0 and len(spine) > 2:
         # The arms hang down from the neck, as in 3ds Max Biped.
         joints |= {"neck": chest, "chest": spine[1]}
     above = [c for c in skeleton.children[chest] if c not in arms and heights[c] > 0]

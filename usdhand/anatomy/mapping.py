@@ -239,14 +239,20 @@ def _sides(rig: Rig, found: Sequence[geometry.FoundHand]) -> tuple[list[Side], s
     if None not in named and len(set(named)) == len(named):
         return [s for s in named if s], "words in the joint names"
     shapes = [geometry.chirality(rig.points, h.wrist, h.joints) for h in found]
+    above = [named_side(rig.path(h.wrist)) for h in found]
     if len(found) == 1:
-        if shapes[0] is None:
+        said = {above[0]: "words above it", shapes[0]: "the hand's shape"}
+        said.pop(None, None)
+        if len(said) != 1:
+            why = "shape and names disagree" if said else "neither names nor shape say"
             raise HandNotFoundError(
-                f"a hand was found at {rig.path(found[0].wrist)}, but neither names nor shape say "
+                f"a hand was found at {rig.path(found[0].wrist)}, but {why} "
                 f"whether it is left or right; {ADVICE}"
             )
-        return [shapes[0]], "the hand's shape"
+        return next(([s], how) for s, how in said.items() if s)
     votes = geometry.first_is_left(rig.skeleton, rig.points, found, shapes)
+    if set(above) == set(SIDES):
+        votes["words above them"] = 1.0 if above[0] == "left" else -1.0
     total = sum(votes.values())
     if abs(total) < 1e-9:
         raise HandNotFoundError(
@@ -260,10 +266,11 @@ def _sides(rig: Rig, found: Sequence[geometry.FoundHand]) -> tuple[list[Side], s
 
 
 def _named_side(rig: Rig, hand: geometry.FoundHand) -> Side | None:
-    """Side of the file's own name for the wrist or arm, else the one that all names agree on."""
+    """Side of the file's own name for the wrist or arm, else of most of the hand's own names."""
     if any(rig.skeleton.aliases):
         for joint in (hand.wrist, *rig.skeleton.ancestors(hand.wrist)):
             if side := named_side(rig.skeleton.aliases[joint]):
                 return side
-    sides = {named_side(rig.path(j)) for j in (hand.wrist, *hand.joints.values())}
-    return sides.pop() if len(sides) == 1 else None
+    sides = [named_side(rig.skeleton.names[j]) for j in (hand.wrist, *hand.joints.values())]
+    said = {side for side in sides if side}
+    return said.pop() if len(said) == 1 and 2 * sides.count(None) < len(sides) else None
