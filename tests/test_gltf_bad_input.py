@@ -124,7 +124,7 @@ FAULTS = {
     "sparse row": (
         put("accessors", 10, "sparse", "indices", "componentType", value=5126), "no unsigned",
     ),
-    "sparse count": (put("accessors", 10, "sparse", "count", value=10**9), "sparse.count is 1000"),
+    "sparse count": (put("accessors", 10, "sparse", "count", value=10**9), r"sparse replaces more"),
     "cameras only": (
         lambda d: [d.pop(k) for k in ("skins", "animations", "extensions")] + [d["nodes"].pop()],
         "no character",
@@ -374,7 +374,7 @@ def fuzz(count: int, seed: int, tmp_path: Path) -> None:
 
 
 def test_any_damage(tmp_path: Path) -> None:
-    fuzz(1500, 1, tmp_path)
+    fuzz(1000, 1, tmp_path)
 
 
 @pytest.mark.slow

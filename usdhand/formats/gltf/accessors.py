@@ -94,8 +94,9 @@ def _view(
 
 def _with_sparse(document: Document, sparse: Element, dense: NDArray[Any]) -> NDArray[Any]:
     """The same rows with some of them replaced."""
-    counted = sparse.need("count")
-    count = counted.whole(1, len(dense) + 1)
+    count = sparse.need("count").whole(1)
+    if count > len(dense):
+        sparse.refuse(f"replaces more rows than the {len(dense)} that there are")
     places, values = sparse.need("indices"), sparse.need("values")
     dtype = _dtype(places)
     if dtype.kind != "u":

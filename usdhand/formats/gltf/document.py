@@ -277,7 +277,9 @@ def _data_uri(buffer: Element, uri: str) -> bytes:
 
 def _short(value: float) -> str:
     # A number of thousands of digits cannot be printed.
-    return f"{value:g}" if isinstance(value, float) or abs(value) < 10**15 else "huge"
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value) if abs(value) < 10**15 else "huge"
 
 
 def _quoted(text: str) -> str:
