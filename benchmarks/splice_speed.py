@@ -1,11 +1,13 @@
 """Time and memory of aligning one hand: 3000 and 36000 frames, and the paper's 569.
 
-Run: python benchmarks/splice_speed.py [--takes FOLDER] [--peer]
+Run: python benchmarks/splice_speed.py [--takes FOLDER] [--peer] [--peers PYTHON ...]
 
 The motion is real takes one after the other, often enough; the hand clip is the same motion with a
 smooth warp. With --peer, pass 1 as the paper prints it is timed at 3000 frames: a numpy cost matrix
-and dtw-python (GPL, not a dependency). Every length runs in a process of its own, whose peak memory
-above that of the clips is measured. Times include everything from the markers to both passes.
+and dtw-python (GPL, not a dependency). With --peers, other packages' DTW is timed at 3000 and 36000
+frames with the interpreters given, with limits on memory and time, see benchmarks/splice_peers.py.
+Every length and package runs in a process of its own, whose peak memory above that of the clips is
+measured. Times include everything from the markers to both passes.
 """
 
 from __future__ import annotations
@@ -13,21 +15,25 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import resource
+import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from splice_peers import PEERS
 
 from usdhand import api
 from usdhand.splice.markers import Markers, hand_markers
-from usdhand.splice.method import SpliceSettings, align, pinned_band, smooth_warp
+from usdhand.splice.method import SpliceSettings, align, pinned_band
 from usdhand.splice.phases import smoothed
 
 HERE = Path(__file__).resolve().parent.parent
 REAL = HERE.parent / "shared" / "data" / "studiogalt" / "full"
 SETTINGS = SpliceSettings()
+PEER_GB, PEER_SECONDS = 8, 300
 
 
 def main() -> None:
@@ -36,6 +42,7 @@ def main() -> None:
         "--takes", type=Path, default=REAL if REAL.is_dir() else HERE / "samples" / "gestures"
     )
     parser.add_argument("--peer", action="store_true")
+    parser.add_argument("--peers", metavar="PYTHON", nargs="+", default=[])
     arguments = parser.parse_args()
     takes = markers_of(arguments.takes)
     print("frames  seconds  cells of pass 1  ns a cell  peak MB above the clips")
@@ -52,6 +59,46 @@ def main() -> None:
             f"numpy cost matrix and dtw-python at 3000 frames: {theirs:.2f} s, "
             f"{theirs / seconds[3000]:.0f} times as long"
         )
+    if arguments.peers:
+        print(f"others, within {PEER_GB} GB and {PEER_SECONDS} s:")
+        for frames in (3000, 36000):
+            with tempfile.TemporaryDirectory() as folder:
+                file = Path(folder) / "derivatives.npz"
+                body, hand = (derivatives(m) for m in pair(takes, frames))
+                np.savez(file, body=body, hand=hand)
+                for package in PEERS:
+                    print(f"{frames:6d}  {package:12}  {peer(package, file, arguments.peers)}")
+
+
+def derivatives(markers: Markers) -> np.ndarray:
+    """(frames, 24) velocities and accelerations, each of unit RMS."""
+    deviation = SETTINGS.smoothing * SETTINGS.fps
+    both = [smoothed(markers.positions, deviation, k).reshape(len(markers), -1) for k in (1, 2)]
+    return np.concatenate([d / np.sqrt(np.mean(d**2)) for d in both], axis=1)
+
+
+def peer(package: str, file: Path, interpreters: list[str]) -> str:
+    """What a package needs, or why it does not finish."""
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (PEER_GB * 2**30, PEER_GB * 2**30))
+
+    for python in interpreters:
+        command = [python, str(HERE / "benchmarks" / "splice_peers.py"), package, str(file)]
+        try:
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=PEER_SECONDS, preexec_fn=limit
+            )
+        except subprocess.TimeoutExpired:
+            return f"not done after {PEER_SECONDS} s"
+        if done.returncode == 0:
+            seconds, memory = map(float, done.stdout.split()[-2:])
+            return f"{seconds:.3f} s, {memory:.0f} MB above the clips"
+        if "MemoryError" in done.stderr:
+            return f"out of memory at {PEER_GB} GB"
+        if "ModuleNotFoundError" not in done.stderr:
+            return f"failed: {done.stderr.strip().splitlines()[-1]}"
+    return "not installed"
 
 
 def markers_of(folder: Path) -> list[Markers]:
@@ -75,7 +122,7 @@ def pair(takes: list[Markers], frames: int) -> tuple[Markers, Markers]:
         },
     )
     noise = np.random.default_rng(1).normal(size=frames)
-    warp = np.clip(smooth_warp(np.cumsum(1.0 + noise), 60.0), 0, None)
+    warp = np.cumsum(np.maximum(1.0 + 6.0 * smoothed(noise, 30.0), 0.5))
     at = np.rint(warp * (frames - 1) / warp[-1]).astype(int)
     hand = replace(
         body, positions=body.positions[at], wrist=body.wrist[at], forearm=body.forearm[at]

@@ -20,25 +20,22 @@ from usdhand.splice.band import (
     checked_pins,
     pinned_band,
 )
+from usdhand.splice.lengths import checked_lengths, pin_advice
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.merge import with_fingers, with_wrist
 from usdhand.splice.phases import Align, Directions, phase_path, settled, smoothed, steadied
 from usdhand.splice.quality import Phase, phase_qualities
 from usdhand.splice.refine import refined
-from usdhand.splice.warps import monotone, through_pins
+from usdhand.splice.warps import through_pins
 
 Wrist = Literal["body", "hands"]
 
 # A hand whose wrist stays within this of its mean, in cm, does not move.
 STILL_CM = 1.0
-# Lengths that differ by more than this factor are worth a warning.
-UNLIKELY_FACTOR = 2.0
 # However long the clips, steadier turns do not make the path of pass 1 another by more seconds.
 MOST_REACH_S = 5.0
 # Rounds of matching signs with the hand clip in the body's time.
 ROUNDS = 2
-# Beyond this many cells, the way back alone would need a gigabyte.
-MOST_CELLS = 4 * 2**30
 
 
 @dataclass(frozen=True)
@@ -154,7 +151,14 @@ def splice(
     for pin in settings.pins:
         if pin.side is not None and pin.side not in sides:
             raise UsageError(f"Pin {pin} is for the {pin.side} hand, which is not spliced.")
-    notes = list(_checked_lengths(body, hand_clip, settings, any(pins.values())))
+    notes = checked_lengths(
+        body,
+        hand_clip,
+        pins,
+        settings.band[0],
+        settings.fps,
+        lambda: pin_advice(body, hand_clip, body_hands, hand_hands, sides),
+    )
     found, more = _aligned_hands(body, hand_clip, body_hands, hand_hands, settings, pins)
     notes += more
     clip, hands = body, {}
@@ -199,9 +203,7 @@ def align(
     tether = settings.tether * hand.fps
     reach = min(settings.band[1] * len(body) / 2, 2 * tether)
     first = through_pins(first / hand.fps, own_times, pins) * hand.fps
-    second = refined(
-        body, hand, first, np.minimum(room * hand.fps, reach), settings.align, tether
-    )
+    second = refined(body, hand, first, np.minimum(room * hand.fps, reach), settings.align, tether)
     return in_time(second), in_time(first), path.cost
 
 
@@ -278,25 +280,3 @@ def _following(alignment: Alignment, side: Side, pins: tuple[Pin, ...], times: A
     return replace(
         alignment, warp=np.stack([times, warp], axis=1), pins=pins, phases=(), taken_from=side
     )
-
-
-def _checked_lengths(
-    body: Clip, hand_clip: Clip, settings: SpliceSettings, pinned: bool
-) -> Sequence[str]:
-    """Notes on the clips' lengths; UsageError where they cannot be of one performance."""
-    for name, clip in (("body", body), ("hand", hand_clip)):
-        if len(clip) < 3:
-            raise InputError(f"The {name} clip {clip.name} has only {len(clip)} frames.")
-    longer, shorter = max(body.duration, hand_clip.duration), min(body.duration, hand_clip.duration)
-    lengths = f"The body lasts {body.duration:.2f} s, the hand clip {hand_clip.duration:.2f} s"
-    cells = settings.band[0] * body.duration * hand_clip.duration * settings.fps**2
-    if cells > MOST_CELLS:
-        raise UsageError(f"{lengths}: too long to align at once. Give a narrower --band.")
-    if longer > shorter / settings.band[0] and not pinned:
-        raise UsageError(
-            f"{lengths}, which is beyond the band of {settings.band[0]:g}. Are they of the same "
-            "performance? Then pin moments that belong together (--pin), or widen the --band."
-        )
-    if longer > UNLIKELY_FACTOR * shorter:
-        return [f"{lengths}: more than a factor of {UNLIKELY_FACTOR:g} apart"]
-    return []

@@ -170,14 +170,14 @@ def alike(body: Markers, hand: Markers, align: Align) -> tuple[Markers, Markers]
     """Both markers, of as many frames, in axes that they share."""
     if align == "trunk":
         return facing_forward(body), facing_forward(hand)
-    turns = steady_turns(body, hand, np.arange(len(body)))
+    turns = steady_turns(body, hand, np.arange(len(body), dtype=np.float64))
     return facing(body, -turns), hand
 
 
 def _evidence(
     ours: NDArray[np.uint64], theirs: NDArray[np.uint64], path: Array, shift: float
 ) -> Array:
-    """(rows,) 0 to 1: how much more the signs would differ if the path went by, earlier or later."""
+    """(rows,) 0 to 1: by how much the signs would differ more if the path were shifted."""
     from usdhand.alignment.phase_dtw import sign_costs
 
     def costs(by: float) -> Array:
@@ -232,7 +232,7 @@ def derivative_signs(
     along = np.stack([_about_vertical(axes, -turn) for turn in turns]).astype(np.float32)
     for order in (1, 2):
         derivative = smoothed(markers.positions, smoothing * markers.fps, order)
-        limit = dead_zone * np.sqrt(np.mean(np.sum(derivative**2, axis=-1)))
+        limit = dead_zone * np.sqrt(3.0 * np.mean(derivative**2))
         by_frame = np.ascontiguousarray(np.moveaxis(derivative, 0, 2), np.float32)
         signs_along(by_frame, along, float(limit), result)
     return result

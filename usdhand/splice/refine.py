@@ -1,4 +1,4 @@
-"""Pass 2: the timing inside the phases, from how the wrist bends, the palm turns and the arm moves."""
+"""Pass 2: the timing inside the phases, from how the wrist bends and how the hand moves."""
 
 from __future__ import annotations
 
@@ -85,4 +85,4 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def _unit(v: Array) -> Array:
-    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9))
+    return np.asarray(v / np.maximum(np.sqrt(np.einsum("...i,...i", v, v))[..., None], 1e-9))
