@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,6 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 SECOND = 46186158000  # FBX ticks
-WEIGHTS = 0x0D050D05  # of both tangents, a third each, in ten thousandths
 ORDERS = ("xyz", "xzy", "yzx", "yxz", "zxy", "zyx")
 COMPONENTWISE, NORMAL, NO_PARENT_SCALE = 0, 1, 2  # FBX InheritType: RrSs, RSrs, Rrs
 Vector = tuple[float, float, float]
@@ -214,12 +214,12 @@ def _animation(
 def _curve(curve: int, keys: Keys) -> str:
     smooth = len(keys[0]) == 3
     slopes = [key[2] if smooth else 0.0 for key in keys]
-    tangents = [(out, into, WEIGHTS, 0) for out, into in zip(slopes, (*slopes[1:], 0.0), strict=True)]
+    tangents = np.array([[out, into, 0, 0] for out, into in pairwise((*slopes, 0.0))], np.float32)
     arrays = {
         "KeyTime": [round(key[0] * SECOND) for key in keys],
         "KeyValueFloat": [key[1] for key in keys],
         "KeyAttrFlags": [0x408 if smooth else 0x4] * len(keys),  # cubic by given tangents; linear
-        "KeyAttrDataFloat": [number for tangent in tangents for number in tangent],
+        "KeyAttrDataFloat": tangents.view(np.int32).ravel(),  # as ASCII files have them
         "KeyAttrRefCount": [1] * len(keys),
     }
     body = "".join(

@@ -61,7 +61,7 @@ def random_chain(seed: int, *, pivots: bool, scales: float, inherit: bool) -> li
     return nodes
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(
     ("pivots", "scales", "inherit"),
     [(False, 0, False), (True, 0, False), (True, 1, False), (True, 2, False), (False, 1, True)],
@@ -83,8 +83,8 @@ def test_smooth_keys(tmp_path: Path) -> None:
         for node in chain()
     ]
     clip = read.read_clip(write_fbx(tmp_path / "a.fbx", nodes))
-    # ufbx gives the place of a time within a segment to single precision
-    assert np.abs(world(clip) - positions(nodes, clip.times)).max() < 1e-4
+    # slopes are of single precision in the file
+    assert np.abs(world(clip) - positions(nodes, clip.times)).max() < 1e-5
 
 
 def _smooth(rng: np.random.Generator) -> Keys:
