@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from usdhand.fill.assemble import Piece, join
+from usdhand.fill.assemble import Piece, join, limited
 from usdhand.fill.path import alternative_paths, best_path, path_cost, transition_cost
 from usdhand.fill.segment import Segmentation, segments
 from usdhand.motion.rotations import Array
@@ -116,18 +116,66 @@ def test_joining_by_the_papers_rule(seed: int, count: int, size: float) -> None:
 
 
 @given(seeds, st.integers(2, 5))
-def test_smooth_joining_keeps_position_and_speed_at_the_seams(seed: int, count: int) -> None:
+def test_smooth_joining_meets_halfway(seed: int, count: int) -> None:
     random = np.random.default_rng(seed)
     curves = np.cumsum(random.normal(size=(count, 40, 3)), axis=1)
     pieces = [Piece(39 * i, 39 * (i + 1), own) for i, own in enumerate(curves)]
     result = join(pieces, "smooth")
-    # By its end, a piece is what it was: offsets do not add up.
-    for piece in pieces:
-        assert_allclose(result[piece.last], piece.curves[-1], atol=1e-9)
+    assert_allclose(result[[0, -1]], [curves[0, 0], curves[-1, -1]], atol=1e-9)
     for piece, before in zip(pieces[1:], curves[:-1], strict=True):
-        step = result[piece.first + 1] - result[piece.first]
-        last = before[-1] - before[-2]
-        assert np.abs(step - last).max() < 0.5 + np.abs(before[-1] - piece.curves[0]).max() * 0.01
+        assert_allclose(result[piece.first], (before[-1] + piece.curves[0]) / 2, atol=1e-9)
+        ahead = result[piece.first + 1] - result[piece.first]
+        behind = result[piece.first] - result[piece.first - 1]
+        change = np.abs(before[-1] - piece.curves[0]).max()
+        assert np.abs(ahead - behind).max() < 0.5 + 0.01 * change
+
+
+@given(seeds, st.integers(1, 6))
+def test_joining_knows_no_direction_of_time(seed: int, count: int) -> None:
+    """What plays backwards is joined the same way, so that no hand comes late or early."""
+    random = np.random.default_rng(seed)
+    curves = [random.normal(size=(int(random.integers(2, 9)), 3)) for _ in range(count)]
+
+    def joined(parts: list[Array]) -> Array:
+        pieces, first = [], 0
+        for own in parts:
+            pieces.append(Piece(first, first + len(own) - 1, own))
+            first += len(own) - 1
+        return join(pieces)
+
+    assert_allclose(joined([c[::-1] for c in curves[::-1]]), joined(curves)[::-1], atol=1e-9)
+
+
+@given(seeds, st.integers(2, 200), st.sampled_from([24.0, 30.0, 60.0]))
+def test_limits_hold_without_corners(seed: int, frames: int, fps: float) -> None:
+    random = np.random.default_rng(seed)
+    time = np.arange(frames)[:, None] / fps
+    curves = 40 * np.sin(random.uniform(1, 8, 4) * time + random.uniform(0, 6, 4))
+    low, high = np.full(4, -30.0), np.full(4, 35.0)
+    low[3], high[3] = -100.0, 100.0
+    found = limited(curves, low, high, fps)
+    assert (found >= low).all()
+    assert (found <= high).all()
+    assert np.array_equal(found[:, 3], curves[:, 3])
+    beyond = ((curves < low) | (curves > high))[:, :3]
+    reach = 2 * round(0.1 * fps) + 1
+    far = [t for t in range(frames) if not beyond[max(0, t - reach) : t + reach + 1].any()]
+    assert_allclose(found[far], curves[far], atol=1e-9)
+
+
+def test_a_limit_bends_no_faster_than_hands_do() -> None:
+    """Cut off, a curve has a corner as sharp as the frame rate; eased, it has none."""
+    time = np.arange(240)[:, None] / 60.0
+    curves = 40 * np.sin(4 * time)
+    low, high = np.array([-100.0]), np.array([30.0])
+
+    def sharpest(values: Array) -> float:
+        return float(np.abs(np.diff(values, n=2, axis=0)).max() * 60**2)
+
+    eased = limited(curves, low, high, 60.0)
+    assert sharpest(np.clip(curves, low, high)) > 5000
+    assert sharpest(eased) < 2000
+    assert eased.max() > 25  # and is not held far below the limit
 
 
 @given(seeds, st.integers(2, 6))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -42,25 +43,37 @@ class Piece:
 def join(pieces: Sequence[Piece], blend: Blend = "smooth") -> Array:
     """Curves (frames, channels) of consecutive pieces without jumps at the seams.
 
-    The difference at a seam is added to the new piece as an offset. With ``linear`` it stays
-    unless its mean exceeds 5 degrees or its maximum 20, and then is blended out linearly, as in
-    the paper. With ``smooth`` (the default) every offset is blended out, together with the
-    difference in speed, along a cubic, so that offsets do not add up and speeds do not jump.
+    With ``linear``, as in the paper, the difference at a seam is added to the new piece as an
+    offset, which stays unless its mean exceeds 5 degrees or its maximum 20, and then is blended
+    out linearly. With ``smooth`` (the default) both pieces go half of the way, in angle and in
+    speed, along a cubic each: offsets do not add up, speeds do not jump, and the hand does not come
+    late, as it does where only the new piece has to give way.
     """
+    curves = _halfway(pieces) if blend == "smooth" else _offset(pieces)
     result = np.empty((pieces[-1].last + 1, pieces[0].curves.shape[1]))
-    velocity = np.zeros(result.shape[1])
-    for number, piece in enumerate(pieces):
-        curves = piece.curves
-        if number > 0:
-            offset = result[piece.first] - curves[0]
-            if blend == "linear":
-                curves = curves + offset * _linear_weights(offset, len(curves))
-            else:
-                jump = velocity - _velocity(curves, 0)
-                curves = curves + _cubic(offset, jump, len(curves))
-        result[piece.first : piece.last + 1] = curves
-        velocity = _velocity(curves, -1)
+    for piece, own in zip(pieces, curves, strict=True):
+        result[piece.first : piece.last + 1] = own
     return result
+
+
+def _offset(pieces: Sequence[Piece]) -> list[Array]:
+    """Pieces that begin where the one before ends."""
+    joined = [pieces[0].curves]
+    for piece in pieces[1:]:
+        offset = joined[-1][-1] - piece.curves[0]
+        joined.append(piece.curves + offset * _linear_weights(offset, len(piece.curves)))
+    return joined
+
+
+def _halfway(pieces: Sequence[Piece]) -> list[Array]:
+    """Pieces that meet halfway, in angle and in speed."""
+    joined = [piece.curves.copy() for piece in pieces]
+    for i, (before, after) in enumerate(pairwise(pieces)):
+        offset = 0.5 * (after.curves[0] - before.curves[-1])
+        jump = 0.5 * (_velocity(after.curves, 0) - _velocity(before.curves, -1))
+        joined[i] += _cubic(offset, -jump, len(before.curves))[::-1]
+        joined[i + 1] += _cubic(-offset, -jump, len(after.curves))
+    return joined
 
 
 def soften_seams(curves: Array, seams: Sequence[int], fps: float) -> Array:
