@@ -167,7 +167,7 @@ def _time_problems(scene: Scene, rig: Rig, sampled: Sampled) -> Iterator[Problem
     if still:
         message = f"{still} joints are not animated and stay at rest"
         yield Problem("fewer-joints", message, take.name, "note")
-    if take.by_keys:
+    if sampled.by_keys:
         message = (
             f"the animation is said to last from {take.begin:g} to {take.end:g} s, but its keys "
             f"from {take.first_key:g} to {take.last_key:g} s: the keys are followed"

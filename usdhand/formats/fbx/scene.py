@@ -49,16 +49,20 @@ class Take:
     first_key: float
     last_key: float
     key_spacing: float
-    by_keys: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """One take at each frame: ``first`` is the time code of the first frame, in frames."""
+    """One take at each frame.
+
+    ``first`` is the time of the first frame, in frames; ``by_keys`` tells that the first and last
+    key decided about the span, since that of the take cannot be meant.
+    """
 
     take: Take
     fps: float
     first: float
+    by_keys: bool
     transforms: Transforms
 
 
@@ -193,7 +197,6 @@ def _take(stack: dict[str, Any]) -> Take:
         first_key=stack["first"],
         last_key=stack["last"],
         key_spacing=stack["spacing"],
-        by_keys=stack.get("by_keys", False),
     )
 
 
@@ -212,7 +215,7 @@ def _sampled(
     transforms = _transforms(values)
     if not _finite(transforms):
         raise InputError(f"{path}: not-a-number in the animation '{take.name}'.")
-    return Sampled(take, sampled["fps"], sampled["first"], transforms)
+    return Sampled(take, sampled["fps"], sampled["first"], sampled["by_keys"], transforms)
 
 
 def _transforms(values: Array) -> Transforms:

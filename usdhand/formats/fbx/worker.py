@@ -39,46 +39,58 @@ def main(request: dict[str, Any]) -> None:
     _limit(request["memory"])
     sys.path.append(request["library"])
     ufbx: Any = importlib.import_module("ufbx")
-    with open(request["path"], "rb") as file:  # noqa: PTH123  (pathlib takes time to import)
-        data = file.read()
     try:
-        scene = ufbx.load_memory(
-            data,
-            file_format=ufbx.FileFormat.FBX,
-            ignore_embedded=True,
-            skip_skin_vertices=True,
-            skip_mesh_parts=True,
-        )
+        scene = _load(ufbx, request["path"])
+    except ufbx.UnknownError:
+        return _answer({"error": "its contents are damaged"})
     except (ufbx.UfbxError, ValueError) as error:
         return _answer({"error": str(error)})
-    nodes = held(scene.nodes)
-    index = {node.element_id: i for i, node in enumerate(nodes)}
-    stacks = held(scene.anim_stacks)
-    described = [_stack(stack, index) for stack in stacks]
-    keyed = [i for i, stack in enumerate(described) if stack["moved"]]
+    nodes, stacks = held(scene.nodes), held(scene.anim_stacks)
+    header = _header(scene, nodes, stacks)
     name = request["animation"]
-    wanted = [i for i in keyed if name is None or name == described[i]["name"]]
-    settings = scene.settings
-    says_rate = settings.time_mode.name != "DEFAULT" and 0.1 <= settings.frames_per_second <= 1e4
-    header = {
-        "unit_meters": settings.unit_meters,
-        "axes": [int(axis) for axis in settings.axes],
-        "version": scene.metadata.version,
-        "fps": settings.frames_per_second if says_rate else None,
-        "nodes": [_node(node, index) for node in nodes],
-        "stacks": described,
-        **_bind(scene, index),
-    }
+    keyed = [i for i, stack in enumerate(header["stacks"]) if stack["moved"]]
+    wanted = [i for i in keyed if name is None or name == header["stacks"][i]["name"]]
     if len(wanted) != 1 or not request["sample"]:
         return _answer(header)
     [chosen] = wanted
-    fps = settings.frames_per_second if says_rate else _rate(described[chosen]["spacing"])
-    begin, count = _frames(described[chosen], fps)
-    header["sampled"] = {"stack": chosen, "fps": fps, "first": begin * fps, "count": count}
+    stack = header["stacks"][chosen]
+    fps = header["fps"] or _rate(stack["spacing"])
+    first, count, by_keys = _frames(stack, fps)
     if not 0 < count <= MAX_FRAMES:
         return _answer({"error": f"the keys span {count} frames; at most {MAX_FRAMES} are read"})
-    moved = [nodes[i] for i in described[chosen]["moved"]]
-    return _answer(header, _samples(ufbx, stacks[chosen], moved, header))
+    header["sampled"] = {"stack": chosen, "fps": fps, "first": first, "count": count}
+    header["sampled"]["by_keys"] = by_keys
+    times = [(first + frame) / fps for frame in range(count)]
+    moved = [nodes[i] for i in stack["moved"]]
+    return _answer(header, _samples(ufbx.evaluate_transform, stacks[chosen].anim, moved, times))
+
+
+def _load(ufbx: Any, path: str) -> Any:
+    with open(path, "rb") as file:  # noqa: PTH123  (pathlib takes time to import)
+        data = file.read()
+    return ufbx.load_memory(
+        data,
+        file_format=ufbx.FileFormat.FBX,
+        ignore_embedded=True,
+        skip_skin_vertices=True,
+        skip_mesh_parts=True,
+    )
+
+
+def _header(scene: Any, nodes: list[Any], stacks: list[Any]) -> dict[str, Any]:
+    """Everything but the samples; ``fps`` is None where the file does not say."""
+    index = {node.element_id: i for i, node in enumerate(nodes)}
+    settings = scene.settings
+    fps = settings.frames_per_second
+    return {
+        "version": scene.metadata.version,
+        "unit_meters": settings.unit_meters,
+        "axes": [int(axis) for axis in settings.axes],
+        "fps": fps if settings.time_mode.name != "DEFAULT" and 0.1 <= fps <= 1e4 else None,
+        "nodes": [_node(node, index) for node in nodes],
+        "stacks": [_stack(stack, index) for stack in stacks],
+        **_bind(scene, index),
+    }
 
 
 def _limit(memory: int) -> None:
@@ -93,13 +105,10 @@ def _limit(memory: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _samples(ufbx: Any, stack: Any, nodes: list[Any], header: dict[str, Any]) -> array.array[float]:
-    """Translation, rotation and scale of each moved node at each frame: 10 numbers."""
-    anim, evaluate = stack.anim, ufbx.evaluate_transform
-    fps, first = header["sampled"]["fps"], header["sampled"]["first"]
+def _samples(evaluate: Any, anim: Any, nodes: list[Any], times: list[float]) -> array.array[float]:
+    """Translation, rotation and scale of each node at each time: 10 numbers."""
     values = array.array("d")
-    for frame in range(header["sampled"]["count"]):
-        time = (first + frame) / fps
+    for time in times:
         for node in nodes:
             place, turn, size = evaluate(anim, node, time)
             values.extend((*place, *turn, *size))
@@ -158,23 +167,22 @@ def _rate(spacing: float) -> float:
     return round(1.0 / spacing, 3) if spacing > 1e-4 else 30.0
 
 
-def _frames(stack: dict[str, Any], fps: float) -> tuple[float, int]:
-    """Start in seconds and number of frames: the take's own span, the keys' if that is not meant.
+def _frames(stack: dict[str, Any], fps: float) -> tuple[float, int, bool]:
+    """Start in frames, number of frames, and whether the keys decide.
 
-    Sets ``by_keys`` in ``stack`` where the keys decide.
+    They do where the take's own span is empty, off the keys, or far longer than them.
     """
     begin, end, first, last = (stack[k] for k in ("begin", "end", "first", "last"))
-    keyed = max(last - first, 1.0)
-    stack["by_keys"] = not (begin < end and begin <= last and end >= first) or (
-        end - begin > BLANK_FACTOR * keyed
+    by_keys = not (begin < end and begin <= last and end >= first) or (
+        end - begin > BLANK_FACTOR * max(last - first, 1.0)
     )
-    if stack["by_keys"]:
+    if by_keys:
         begin, end = first, last
-    start = round(begin * fps) / fps
-    if abs(start - begin) * fps > 1e-3:
-        start = begin
-    frames = (end - start) * fps
-    return start, int(frames + 1e-3) + 1 if frames < 1e12 else sys.maxsize
+    start = float(round(begin * fps))
+    if abs(start - begin * fps) > 1e-3:
+        start = begin * fps
+    frames = end * fps - start
+    return start, int(frames + 1e-3) + 1 if frames < 1e12 else sys.maxsize, by_keys
 
 
 def _bind(scene: Any, index: dict[int, int]) -> dict[str, Any]:
