@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise
 from typing import Any
@@ -239,7 +239,7 @@ def _sides(rig: Rig, found: Sequence[geometry.FoundHand]) -> tuple[list[Side], s
     if None not in named and len(set(named)) == len(named):
         return [s for s in named if s], "words in the joint names"
     shapes = [geometry.chirality(rig.points, h.wrist, h.joints) for h in found]
-    above = [named_side(rig.path(h.wrist)) for h in found]
+    above = [_side_above(rig, hand) for hand in found]
     if len(found) == 1:
         said = {above[0]: "words above it", shapes[0]: "the hand's shape"}
         said.pop(None, None)
@@ -274,3 +274,13 @@ def _named_side(rig: Rig, hand: geometry.FoundHand) -> Side | None:
     sides = [named_side(rig.skeleton.names[j]) for j in (hand.wrist, *hand.joints.values())]
     said = {side for side in sides if side}
     return said.pop() if len(said) == 1 and 2 * sides.count(None) < len(sides) else None
+
+
+def _side_above(rig: Rig, hand: geometry.FoundHand) -> Side | None:
+    """Side that names at the wrist and above it speak of; None if any, or a finger's, disagrees."""
+
+    def said(joints: Iterable[int]) -> set[Side]:
+        return {side for j in joints if (side := named_side(rig.skeleton.names[j]))}
+
+    above = said((hand.wrist, *rig.skeleton.ancestors(hand.wrist)))
+    return above.pop() if len(above) == 1 and said(hand.joints.values()) <= above else None
