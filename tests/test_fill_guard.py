@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_runner import run
-from conftest import REPOSITORY
+from conftest import REPOSITORY, shared_data
+
+from usdhand import api
+from usdhand.anatomy import Side
+from usdhand.fill import MotionLibrary, Segmentation, library_clip
+from usdhand.fill.arm import ArmMotion, arm_motion
+from usdhand.fill.library import at_arm_rate
+from usdhand.fill.same import same_motion
+from usdhand.motion import Clip
 
 SAMPLES = REPOSITORY / "samples"
 TALKS = SAMPLES / "conversations"
@@ -99,3 +109,55 @@ def test_a_body_without_finger_joints_is_told_so(tmp_path: Path) -> None:
     run("library", "build", SAMPLES / "gestures" / "ok_01.usdc", "-o", library, "-q")
     result = run("fill", body, "--library", library, "-o", tmp_path / "o.usda", code=4)
     assert "no finger joints" in result.output
+
+
+def test_the_same_performance_on_a_body_of_other_proportions_is_left_out() -> None:
+    """Its wrists go elsewhere, its hands turn alike; a take that only stands still does neither."""
+    body = api.read_clip(TALKS / "talk_01_body.usdc")
+    longer = body.translations.copy()
+    names = body.skeleton.names
+    longer[:, [i for i, n in enumerate(names) if "Arm" in n or n.endswith("Hand")]] *= 1.4
+    twin = api.read_clip(TALKS / "talk_01_full.usdc")
+    entry = library_clip(
+        twin, api.find_hands(twin), Segmentation(), path="a.usdc", content_hash="1"
+    )
+    other = api.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
+    second = library_clip(
+        other, api.find_hands(other), Segmentation(), path="b.usdc", content_hash="2"
+    )
+    library = MotionLibrary((entry, second))
+    hands = api.find_hands(body)
+
+    def arms(clip: Clip) -> dict[Side, ArmMotion]:
+        return {s: at_arm_rate(arm_motion(clip, hands, s), clip.fps) for s in hands.frames}
+
+    assert same_motion(library, arms(body), None) == [0]
+    assert same_motion(library, arms(replace(body, translations=longer)), None) == [0]
+    still = body.with_rotations(np.repeat(body.rotations[:1], len(body), axis=0))
+    assert same_motion(library, arms(still), None) == []
+    assert same_motion(library, {}, "2") == [1]
+
+
+@pytest.mark.real_data
+def test_the_same_takes_on_two_rigs() -> None:
+    """Every take of the smaller rig is told to be one of the larger, and which."""
+    folders = [shared_data("studiogalt", name) for name in ("mini", "full")]
+    mini, full = (sorted(folder.glob("*.usdc")) for folder in folders)
+    names = [*[path.stem for path in mini][::3], "SG_ASL_About_1_2023_2_27"]
+    entries = []
+    for path in full:
+        if path.stem in names or path.stem < "SG_ASL_Abe":
+            clip = api.read_clip(path)
+            entries.append(
+                library_clip(
+                    clip, api.find_hands(clip), Segmentation(), path=path.name, content_hash=""
+                )
+            )
+    library = MotionLibrary(tuple(entries))
+    for path in mini:
+        if path.stem in names:
+            clip = api.read_clip(path)
+            hands = api.find_hands(clip)
+            arms = {s: at_arm_rate(arm_motion(clip, hands, s), clip.fps) for s in hands.frames}
+            found = same_motion(library, arms, None)
+            assert [library.clips[i].name for i in found] == [path.stem]
