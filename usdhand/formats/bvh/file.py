@@ -136,7 +136,7 @@ def frame_rate(time: str) -> tuple[float, tuple[Problem, ...]]:
     digit = 10.0**exponent if isinstance(exponent, int) else 0.0
     seconds = float(written)
     # The other tolerance is what a float32 leaves of a frame time.
-    within = max(digit, 1e-6 * seconds) * (1 + 1e-9)
+    within = min(max(digit, 2e-7 * seconds), 0.2 * seconds) * (1 + 1e-9)
     if not any(abs(1.0 / fps - seconds) < 1e-9 * seconds for fps in _USUAL_FPS):
         meant = [fps for fps in _USUAL_FPS if abs(1.0 / fps - seconds) < within]
         whole = [fps for fps in meant if fps == int(fps)] or meant

@@ -20,8 +20,9 @@ from usdhand.motion.rotations import Array
 MOST_JOINTS, DEEPEST, LONGEST_NAME = 10_000, 500, 200
 
 _TOKEN = re.compile(rb"[{}]|[^\s{}]+")
-# Only at the start of a line: "Arm #2" is a name.
-_COMMENT = re.compile(rb"(?:#|//|;)[^\r\n]*")
+# Lines of comment; only where a line starts: "Arm #2" is a name.
+_COMMENTS = re.compile(rb"(?:(?:#|//|;)[^\r\n]*+\s*+)++")
+_REST_OF_LINE = re.compile(rb"[^\r\n{}]*")
 _LINE_END = re.compile(rb"\r\n|\r|\n")
 _CHANNEL = re.compile(r"([xyz])(position|rotation|scale)", re.IGNORECASE)
 
@@ -151,16 +152,18 @@ class _Parser:
             self.fail("a ROOT inside of a joint" if stack else f"{key} without a ROOT around it")
         if len(found) >= MOST_JOINTS or len(stack) >= DEEPEST:
             self.fail(f"more than {MOST_JOINTS} joints, or {DEEPEST} inside of each other")
-        place, begin = self.start, self.position
-        while (word := self.word()) != "{":
-            if not word or word == "}" or self.position - begin > LONGEST_NAME + 200:
-                self.fail(f"no brace after {key} of line {line_at(self.data, place)}")
-        name = " ".join(_text(self.data[begin : self.start]).split())
+        place = self.start
+        rest = _REST_OF_LINE.match(self.data, self.position)
+        assert rest is not None
+        self.position = rest.end()
+        name = " ".join(_text(rest[0]).split())
         parent = stack[-1] if stack else -1
+        if key != "END" and not 0 < len(name) <= LONGEST_NAME:
+            self.fail(f"{key} has no name, or one that is too long")
+        if self.word() != "{":
+            self.fail(f"no brace after {key} of line {line_at(self.data, place)}")
         if key == "END":
             return Node(f"{found[parent].name}_End", parent, True, place)
-        if not name or len(name) > LONGEST_NAME:
-            self.fail(f"{key} has no name, or one that is too long")
         return Node(name.replace("/", "_"), parent, False, place)
 
     def channels(self, node: Node) -> None:
@@ -198,11 +201,11 @@ class _Parser:
     def word(self) -> str:
         """Next word, without comments; empty at the end of the file."""
         while (match := _TOKEN.search(self.data, self.position)) is not None:
-            comment = _COMMENT.match(self.data, match.start())
-            if comment is None or not self.starts_line(match.start()):
+            comments = _COMMENTS.match(self.data, match.start())
+            if comments is None or not self.starts_line(match.start()):
                 self.start, self.position = match.span()
                 return _text(match[0])
-            self.position = comment.end()
+            self.position = comments.end()
         self.start = self.position = len(self.data)
         return ""
 

@@ -1,4 +1,4 @@
-"""A Clip written as a BVH file: centimetres, joints with the world's axes, the bind pose at zero."""
+"""A Clip written as a BVH file: joints with the axes of the world, the bind pose at zero."""
 
 from __future__ import annotations
 
@@ -228,8 +228,8 @@ def _problems(clip: Clip, layout: _Layout, renamed: int) -> Iterator[Problem]:
     moving = [j for j in sorted(layout.with_positions) if parents[j] >= 0]
     if moving:
         message = (
-            f"{len(moving)} joints below the root move in their parents and have position channels, "
-            "which some programs do not read"
+            f"{len(moving)} joints below the root move in their parents and have position "
+            "channels, which some programs do not read"
         )
         yield Problem("moving-joints", message, clip.skeleton.joints[moving[0]], "note")
     if renamed:
