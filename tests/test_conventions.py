@@ -69,8 +69,9 @@ def test_no_name_stands_for_two_joints(convention: Convention) -> None:
                 assert seen.setdefault(key, (side, role)) == (side, role), key
 
 
-def test_two_ways_to_write_a_name_are_one() -> None:
-    assert {name_key(n) for n in ("hand.L", "hand_L", "HandL", "hand l")} == {"handl"}
+def test_all_ways_to_write_a_name_are_one() -> None:
+    spelled = ("hand.L", "hand_L", "HandL", "hand l", "handFBXASC046L", "hand|L", "_hand-L")
+    assert {name_key(n) for n in spelled} == {"handl"}
 
 
 @pytest.mark.parametrize(

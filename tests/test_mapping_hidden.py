@@ -298,7 +298,7 @@ def test_bound_in_signing_poses(folder: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("folder", ["full", "mini"])
 def test_bound_in_all_signing_poses(folder: str) -> None:
-    found = verdicts(folder, slice(None), 12)
+    found = verdicts(folder, slice(None), 30)
     assert found["right"] > 0.95 * found.total()
 
 

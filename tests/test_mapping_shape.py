@@ -10,6 +10,7 @@ from rigs import (
     HAND,
     METACARPALS,
     TIPS,
+    Joint,
     Parents,
     build,
     found_joints,
@@ -18,14 +19,15 @@ from rigs import (
     same_joints,
 )
 
-from usdhand.anatomy.hand import DIGITS, FINGERS, SIDES, Side
+from usdhand.anatomy.body import body_of
+from usdhand.anatomy.hand import DIGITS, FINGERS, SIDES, Side, digit_joints
 from usdhand.anatomy.mapping import map_character
 from usdhand.errors import HandNotFoundError
 
 
 @pytest.mark.parametrize("drop", [(), TIPS, METACARPALS, (*TIPS, *METACARPALS)])
 @pytest.mark.parametrize("pose", ["T", "A"])
-@pytest.mark.parametrize("curl", [0.0, 4.0, 12.0, 30.0])
+@pytest.mark.parametrize("curl", [0.0, 4.0, 12.0, 30.0, 70.0])
 def test_unknown_names(pose: str, curl: float, drop: tuple[str, ...]) -> None:
     skeleton, expected = build(nonsense(drop), pose=pose, curl=curl)
     found = map_character(skeleton)
@@ -148,6 +150,106 @@ def test_three_fingers_of_unknown_names() -> None:
     found = map_character(skeleton)
     same_joints(found, expected)
     assert any("from the thumb outwards" in note for note in found.notes)
+
+
+def gone(*digits: str) -> tuple[str, ...]:
+    """All roles of some digits."""
+    return tuple(d + j for d in digits for j in ("Metacarpal", *digit_joints(d), "Tip"))
+
+
+@pytest.mark.parametrize("digits", [("Index",), ("Middle",), ("Ring",), ("Ring", "Pinky")])
+def test_fingers_that_cannot_be_told_are_refused(digits: tuple[str, ...]) -> None:
+    skeleton, _ = build(nonsense(gone(*digits)))
+    with pytest.raises(HandNotFoundError, match=r"cannot be told|neither end"):
+        map_character(skeleton)
+
+
+@pytest.mark.parametrize("joint", ["ThumbCMC", "ThumbMCP"])
+def test_a_thumb_of_two_joints_is_refused(joint: str) -> None:
+    # It could be a CMC and an MCP or an MCP and an IP.
+    skeleton, _ = build(nonsense((joint, *TIPS, *METACARPALS)))
+    with pytest.raises(HandNotFoundError, match="thumb"):
+        map_character(skeleton)
+
+
+def test_a_short_chain_beside_the_wrist_is_no_finger() -> None:
+    named = nonsense((*TIPS, *METACARPALS))
+    extra: dict[str, Joint] = {f"elbow_{s}": (s, "elbow") for s in SIDES}
+    skeleton, expected = build(named, extra=extra)
+    joints = [*skeleton.joints]
+    points = [*skeleton.bind_positions]
+    for side in SIDES:
+        root = next(j for j in joints if j.endswith(f"elbow_{side}"))
+        joints.append(f"{root}/elbow_end_{side[0]}x")
+        points.append(points[joints.index(root)] + np.array([0.0, 0.0, -4.0]))
+    same_joints(map_character(from_points(joints, np.array(points))), expected)
+
+
+def test_arms_that_hang_from_the_neck() -> None:
+    # As in 3ds Max Biped: the clavicles are children of the neck, and lie below it.
+    def move(parents: Parents) -> None:
+        for side in SIDES:
+            parents[side, "clavicle"] = (None, "neck")
+
+    skeleton, expected = build(nonsense(), move=move)
+    same_joints(map_character(skeleton), expected)
+
+
+def test_a_heel_does_not_say_what_is_in_front() -> None:
+    # Legs that end in a short joint behind the ankle, as where feet hang from IK controls.
+    skeleton, expected = build(nonsense(("toe_end",)))
+    points = skeleton.bind_positions.copy()
+    wrists = [expected[side, "wrist"] for side in SIDES]
+    assert body_of(skeleton, points, wrists).facing is not None
+    for side in SIDES:
+        points[expected[side, "toe"]] = points[expected[side, "foot"]] + [0.0, 0.5, -2.0]
+    assert body_of(skeleton, points, wrists).facing is None
+    same_joints(map_character(from_points(list(skeleton.joints), points)), expected)
+
+
+def test_what_ends_near_the_hips_is_no_leg() -> None:
+    skeleton, expected = build(nonsense(("thigh", "shin", "foot", "toe", "toe_end")))
+    joints, points = list(skeleton.joints), list(skeleton.bind_positions)
+    for x in (-12.0, 12.0):
+        path = joints[expected[None, "hips"]]
+        for step in range(3):
+            path += f"/pouch{x:.0f}{step}".replace("-", "m")
+            joints.append(path)
+            points.append(np.array([x, 93.0 + step, 4.0 + 2 * step]))
+    del expected[None, "hips"]
+    same_joints(map_character(from_points(joints, np.array(points))), expected)
+
+
+def test_a_thumb_behind_the_hand_speaks_for_no_side() -> None:
+    # The knuckles' arch says left, the thumb right.
+    named = {j: n for j, n in nonsense().items() if j[0] == "left" and j[1][0].isupper()}
+    skeleton, expected = build({**named, ("left", "wrist"): "root"}, curl=0.0)
+    points = skeleton.bind_positions.copy()
+    for finger in ("Middle", "Ring"):
+        points[expected["left", finger + "MCP"], 1] += 0.5
+    same_joints(map_character(from_points(list(skeleton.joints), points)), expected)
+    thumb = [expected["left", "Thumb" + j] for j in ("MCP", "IP", "Tip")]
+    points[thumb, 1] = points[expected["left", "wrist"], 1] + [2.0, 3.0, 4.0]
+    with pytest.raises(HandNotFoundError, match="neither names nor shape"):
+        map_character(from_points(list(skeleton.joints), points))
+
+
+def test_a_word_above_a_hand_must_not_contradict_its_shape() -> None:
+    named = {j: n for j, n in nonsense().items() if j[0] == "left" and j[1][0].isupper()}
+    for word in ("left", "right"):
+        skeleton, expected = build({**named, ("left", "wrist"): f"{word}Glove"})
+        if word == "left":
+            same_joints(map_character(skeleton), expected)
+        else:
+            with pytest.raises(HandNotFoundError, match="shape and names disagree"):
+                map_character(skeleton)
+
+
+def test_a_word_above_a_flat_hand_tells_its_side() -> None:
+    named = {j: n for j, n in nonsense().items() if j[0] == "left" and j[1][0].isupper()}
+    skeleton, expected = build({**named, ("left", "wrist"): "LeftGlove"})
+    flat = from_points(list(skeleton.joints), skeleton.bind_positions * [1, 0, 1])
+    same_joints(map_character(flat), expected)
 
 
 def test_toes_are_no_fingers() -> None:
