@@ -12,6 +12,7 @@ process with usd-core.
 """
 
 import json
+import os
 import sys
 import time
 from pathlib import Path
@@ -152,4 +153,5 @@ def drawn(armature: bpy.types.Object) -> list[list]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))))
+    print(json.dumps(main(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))), flush=True)
+    os._exit(0)  # the bpy module 4.5 hangs at its end once its USD was loaded

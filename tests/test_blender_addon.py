@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
+import shlex
 import subprocess
 from functools import partial
 from pathlib import Path
@@ -108,6 +110,21 @@ def trip(clip: Clip, folder: Path, edits: list[list[object]], rig: Path) -> dict
     unedited = hand_angles(api.expand(rig), folder / "poses.npz", index).max()
     assert (unedited > 5.0) == bool(edits)
     return said
+
+
+@in_blender
+def test_the_guide_works_as_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "samples").symlink_to(SAMPLES)
+    monkeypatch.chdir(tmp_path)
+    text = (ADD_ON.parent / "README.md").read_text(encoding="utf-8")
+    shown = [shlex.split(line)[1:] for line in re.findall(r"^ +(usdhand .*)$", text, re.M)]
+    assert [verb for verb, *_ in shown] == ["reduce", "expand"]
+    run(*shown[0])
+    export = tmp_path / shown[1][1]
+    said = blender(tmp_path, **{"import": tmp_path / shown[0][-1], "export": export})
+    assert "refused" not in said
+    run(*shown[1])
+    assert (tmp_path / shown[1][-1]).exists()
 
 
 @in_blender

@@ -153,9 +153,9 @@ def _add_keys(armature: bpy.types.Object, channel: Channel, group: str, thin: fl
     data = armature.animation_data_create()
     if data.action is None:
         data.action = bpy.data.actions.new(f"{armature.name} hands")
-    curve = data.action.fcurve_ensure_for_datablock(
-        armature, f'["{channel.name}"]', group_name=group
-    )
+    curve = data.action.fcurve_ensure_for_datablock(armature, f'["{channel.name}"]')
+    groups = _curves_of(armature).groups
+    curve.group = groups.get(group) or groups.new(group)
     keys = thinned(np.array([channel.times, channel.values]).T, thin)
     points = curve.keyframe_points
     points.add(len(keys))
@@ -238,12 +238,15 @@ def _add_helpers(
 
 def _drop_rotation_curves(armature: bpy.types.Object, bones: set[str]) -> None:
     """Remove the imported keys that would fight the drivers."""
-    data = armature.animation_data
-    if data is None or data.action is None:
+    if armature.animation_data is None or armature.animation_data.action is None:
         return
     paths = {f'pose.bones["{bone}"].rotation_quaternion' for bone in bones}
-    for layer in data.action.layers:
-        for strip in layer.strips:
-            for bag in strip.channelbags:
-                for curve in [c for c in bag.fcurves if c.data_path in paths]:
-                    bag.fcurves.remove(curve)
+    curves = _curves_of(armature).fcurves
+    for curve in [c for c in curves if c.data_path in paths]:
+        curves.remove(curve)
+
+
+def _curves_of(armature: bpy.types.Object) -> bpy.types.ActionChannelbag:
+    """The part of an armature's action that is about the armature."""
+    data = armature.animation_data
+    return data.action.layers[0].strips[0].channelbag(data.action_slot)
