@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from usdhand.anatomy import CharacterMap, Hands, Side
+from usdhand.anatomy import Hands, Side
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion.kinematics import scaled_joints
 from usdhand.motion.rotations import Array
@@ -60,6 +60,7 @@ def lane_data(lane: Lane, pack: Pack, max_frames: int) -> tuple[dict[str, Any], 
             f"{lane.name}: long clip, the page has every {_ordinal(every)} of {len(clip)} frames "
             f"({clip.fps / every:.3g} a second) and blends between them"
         )
+    drawn = _drawn(clip.skeleton, lane.hands)
     positions = forward_kinematics(clip).positions[:: max(every, len(clip) // 600)]
     data: dict[str, Any] = {
         "name": lane.name,
@@ -77,8 +78,8 @@ def lane_data(lane: Lane, pack: Pack, max_frames: int) -> tuple[dict[str, Any], 
         "rotations": [pack.rotations(clip.rotations[kept, j]) for j in _joints(clip)],
         "translations": [pack.curve(clip.translations[kept, j]) for j in _joints(clip)],
         "scales": {str(j): pack.curve(clip.scales[kept, j]) for j in sorted(scaled_joints(clip))},
-        "bones": _bones(clip, lane.hands, positions),
-        "view": _view(clip, lane.hands, positions),
+        "bones": _bones(clip, lane.hands, drawn, positions),
+        "view": _view(clip, lane.hands, drawn, positions),
         "hands": {},
         "meshes": [_mesh(skin, pack) for skin in lane.skins],
         "retime": {side: warp.tolist() for side, warp in lane.retime.items()},
@@ -131,17 +132,18 @@ def _hand_length(skeleton: Skeleton, hands: Hands, side: Side) -> float:
     return float(max(lengths))
 
 
-def _bones(clip: Clip, hands: Hands | None, positions: Array) -> list[dict[str, Any]]:
+def _bones(
+    clip: Clip, hands: Hands | None, drawn: Sequence[int], positions: Array
+) -> list[dict[str, Any]]:
     """Bones from a joint to a point in its axes: {joint, to, radius, part}."""
     skeleton = clip.skeleton
     offsets = clip.translations.mean(axis=0)
     own = _hand_joints(skeleton, hands)
-    hidden = _above_hips(skeleton, hands.character if hands else None)
-    tall = float(np.ptp(positions[..., 1].mean(axis=0))) or 1.0
+    tall = float(np.ptp(positions[:, drawn, 1].mean(axis=0))) or 1.0
     bones = []
-    for child, parent in enumerate(skeleton.parents.tolist()):
-        length = float(np.linalg.norm(offsets[child]))
-        if parent < 0 or child in hidden or length < 1e-3 * min(tall, 100.0):
+    for child in drawn:
+        parent, length = int(skeleton.parents[child]), float(np.linalg.norm(offsets[child]))
+        if parent not in drawn or length < 1e-3 * min(tall, 100.0):
             continue
         part, radius = own.get(child, ("body", 0.0))
         if part == "body":
@@ -182,22 +184,39 @@ def _hand_joints(skeleton: Skeleton, hands: Hands | None) -> dict[int, tuple[str
     return found
 
 
-def _above_hips(skeleton: Skeleton, character: CharacterMap | None) -> frozenset[int]:
-    """Hips and what is above: a bone from a root on the floor is none."""
-    hips = character.hips if character else None
-    return frozenset() if hips is None else frozenset((hips, *skeleton.ancestors(hips)))
+def _drawn(skeleton: Skeleton, hands: Hands | None) -> tuple[int, ...]:
+    """Joints of the body: none above the hips, nor of trees that have neither hips nor a hand.
+
+    A bone from a root on the floor is none, and targets of eyes and feet are no body.
+    """
+    if hands is None:
+        return tuple(range(len(skeleton)))
+    hips = hands.character.hips
+    own = [m.wrist for m in hands.character.hands.values()] + ([] if hips is None else [hips])
+    above = set() if hips is None else set(skeleton.ancestors(hips))
+    roots = {(joint, *skeleton.ancestors(joint))[-1] for joint in own}
+    return tuple(
+        joint
+        for joint in range(len(skeleton))
+        if (joint, *skeleton.ancestors(joint))[-1] in roots and joint not in above
+    )
 
 
-def _view(clip: Clip, hands: Hands | None, positions: Array) -> dict[str, Any]:
+def _view(
+    clip: Clip, hands: Hands | None, drawn: Sequence[int], positions: Array
+) -> dict[str, Any]:
     """Where a camera for the whole body looks: middle and size of the motion, and the front."""
-    low, high = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
-    one = np.ptp(positions[0], axis=0)
+    body = positions[:, drawn]
+    low, high = body.min(axis=(0, 1)), body.max(axis=(0, 1))
+    one = np.ptp(body[0], axis=0)
     reach = float(np.linalg.norm(one))
     travels = float(np.linalg.norm((high - low)[[0, 2]])) > 1.8 * reach
     follow = _middle_joint(clip, hands) if travels else None
+    size = max(reach if travels else float((high - low).max()), 1.0)
+    above = 0.1 * size  # heads are higher than their joints
     return {
-        "centre": [float(x) for x in (low + high) / 2],
-        "size": max(reach if travels else float((high - low).max()), 1.0),
+        "centre": [float(x) for x in (low + high) / 2 + [0.0, above / 2, 0.0]],
+        "size": size + above,
         "floor": float(low[1]),
         "follow": follow,
         "yaw": _facing(hands, positions) if hands else 0.0,

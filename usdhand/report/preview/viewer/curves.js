@@ -131,7 +131,8 @@ export class Curves {
         value.hidden = !this.shown[i] || !tables[i];
         if (value.hidden) return;
         const frame = laneTime(lane, this.playback.time, side) * lane.fps;
-        value.textContent = `${tables[i].at(frame, [0])[0].toFixed(1)}°`;
+        const text = tables[i].at(frame, [0])[0].toFixed(1);
+        value.textContent = `${text === '-0.0' ? '0.0' : text}°`;
       });
     }
   }

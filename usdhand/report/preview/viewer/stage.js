@@ -6,7 +6,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'orbit';
 
 const FIELD_OF_VIEW = 32;
-const FIRST_VIEW = { body: [0.5, 0.2, 2.3], left: [0.5, 0.5, 2.0], right: [-0.5, 0.5, 2.0] };
+const FIRST_VIEW = { body: [0.5, 0.25, 2.4], left: [0.5, 0.5, 2.0], right: [-0.5, 0.5, 2.0] };
 export const CAMERAS = ['body', 'left', 'right'];
 
 export class Stage {
@@ -176,10 +176,10 @@ function drawnBySoftware() {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
-/** Columns that make the parts of the canvas nearest to squares. */
+/** Columns that leave every lane the largest square. */
 function columnsFor(lanes, aspect) {
+  const square = (n) => Math.min(aspect / n, 1 / Math.ceil(lanes / n));
   let best = 1;
-  const oblong = (n) => Math.abs(Math.log((aspect * Math.ceil(lanes / n)) / n));
-  for (let n = 2; n <= lanes; n++) if (oblong(n) < oblong(best)) best = n;
+  for (let n = 2; n <= lanes; n++) if (square(n) > square(best)) best = n;
   return best;
 }
