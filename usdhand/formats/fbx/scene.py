@@ -149,7 +149,13 @@ def _run(request: dict[str, Any], path: Path) -> bytes:
     damaged = f"{path}: cannot be read as FBX"
     command = [sys.executable, "-I", "-S", str(WORKER), json.dumps(request)]
     try:
-        done = subprocess.run(command, capture_output=True, check=False, timeout=TIME_LIMIT)
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=TIME_LIMIT,
+        )
     except subprocess.TimeoutExpired:
         raise InputError(f"{damaged} (reading took more than {TIME_LIMIT:g} s).") from None
     if done.returncode < 0:
