@@ -23,7 +23,7 @@ from usdhand.formats.gltf.read import animation_names, read_character, read_clip
 from usdhand.motion import Clip, forward_kinematics
 
 TIMES = np.arange(6) / 30.0
-SECONDS = 5.0  # for one small file
+SECONDS = 5.0  # of the processor, for one small file
 MEGABYTES = 1500
 
 
@@ -115,6 +115,9 @@ FAULTS = {
     "not a number": (put("nodes", 1, "scale", value=[float("nan"), 1, 1]), r"holds NaN, which is"),
     "no joints": (put("skins", 0, "joints", value=[]), r"skins\[0\]\.joints is empty"),
     "joint twice": (put("skins", 0, "joints", value=[1, 1]), "lists a joint twice"),
+    "too many skins": (
+        lambda d: d["skins"].extend([d["skins"][0]] * 600), "more than 500 skins",
+    ),
     "bind rows": (put("accessors", -1, "count", value=2), "has a count of 2, not 6"),
     "packed": (
         put("bufferViews", 0, "extensions", value={"EXT_meshopt_compression": {}}),
@@ -195,6 +198,36 @@ def test_more_frames_than_memory(tmp_path: Path) -> None:
     for node in nodes:
         file.curve(node, "rotation", shared, still)
     assert_refused(file.write(tmp_path / "take.glb"), "frames of 401 joints cannot be meant")
+
+
+def test_overlapping_accessors(tmp_path: Path) -> None:
+    """A thousand curves of the same bytes, each with an accessor of its own."""
+    file = GltfFile()
+    file.animation()
+    root = file.node("root")
+    count = 50_000
+    shared = file.accessor(np.arange(count) / 30.0)
+    turned = file.accessor(np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
+    for i in range(1000):
+        again = file.add("accessors", dict(file.json["accessors"][turned]))
+        file.curve(file.node(f"n{i}", root), "rotation", shared, again)
+    message = "need more numbers than the file has bytes"
+    assert_refused(file.write(tmp_path / "take.glb"), message)
+
+
+def test_many_of_one_name(tmp_path: Path) -> None:
+    file = GltfFile()
+    root = file.node("root")
+    shared, turned = file.accessor(TIMES), file.accessor(turns(6, 1))
+    for i in range(600):
+        file.animation("same")
+        file.curve(file.node("same", root), "rotation", shared, turned, animation=i)
+    path = file.write(tmp_path / "take.glb")
+    began = time.process_time()
+    assert animation_names(path)[-1] == "same_600"
+    clip = read_clip(path, animation="same_7")
+    assert len(set(clip.skeleton.joints)) == 600
+    assert time.process_time() - began < SECONDS
 
 
 def test_buffers_that_are_none(tmp_path: Path) -> None:
@@ -313,7 +346,7 @@ def assert_whole(clip: Clip) -> None:
         assert np.isfinite(values).all()
     assert np.isfinite(clip.times).all()
     assert len(set(clip.skeleton.joints)) == joints
-    with np.errstate(all="raise"):
+    with np.errstate(over="raise", invalid="raise", divide="raise"):
         pose = forward_kinematics(clip)
     assert np.isfinite(pose.positions).all()
     for text in (*clip.skeleton.joints, *clip.skeleton.aliases, *map(str, clip.problems)):
@@ -322,14 +355,14 @@ def assert_whole(clip: Clip) -> None:
 
 def survives(path: Path) -> bool:
     """Whether a file could be read; if not, it was refused in words, soon."""
-    began, read = time.monotonic(), False
+    began, read = time.process_time(), False
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for use in (read_clip, read_character, first_of_all):
             with contextlib.suppress(InputError, UsageError):
                 assert_whole(use(path))
                 read = True
-    assert time.monotonic() - began < SECONDS
+    assert time.process_time() - began < SECONDS
     return read
 
 
@@ -374,7 +407,7 @@ def fuzz(count: int, seed: int, tmp_path: Path) -> None:
 
 
 def test_any_damage(tmp_path: Path) -> None:
-    fuzz(1000, 1, tmp_path)
+    fuzz(700, 1, tmp_path)
 
 
 @pytest.mark.slow

@@ -266,22 +266,22 @@ def test_several_of_everything(tmp_path: Path) -> None:
     file = two_people()
     file.animation("blink")  # moves no node
     path = file.write(tmp_path / "take.glb")
-    assert animation_names(path) == ("walk", "walk_1")
+    assert animation_names(path) == ("walk", "walk_2")
     with pytest.raises(UsageError, match=r"2 skeletons: 'Ann', 'Bob'\. Choose one with --skel"):
         read_clip(path)
     with pytest.raises(UsageError, match="2 skeletons"):
         read_character(path)
     with pytest.raises(UsageError, match="no skeleton 'Cy', only 'Ann', 'Bob'"):
         read_clip(path, skel="Cy")
-    with pytest.raises(UsageError, match=r"2 animations: 'walk', 'walk_1'.*--animation NAME"):
+    with pytest.raises(UsageError, match=r"2 animations: 'walk', 'walk_2'.*--animation NAME"):
         read_clip(path, skel="Ann")
     with pytest.raises(UsageError, match="no animation 'run'"):
         read_clip(path, skel="Ann", animation="run")
     with pytest.raises(InputError, match="'walk' moves none of the 6 joints of 'Bob'"):
         read_clip(path, skel="Bob", animation="walk")
-    clip = read_clip(path, skel="Bob", animation="walk_1")
+    clip = read_clip(path, skel="Bob", animation="walk_2")
     origin = clip.origin
-    assert (origin.skeleton_path, origin.animation_path) == ("Bob", "walk_1")
+    assert (origin.skeleton_path, origin.animation_path) == ("Bob", "walk_2")
     again = read_clip(path, skel=origin.skeleton_path, animation=origin.animation_path)
     assert (again.rotations == clip.rotations).all()
 
@@ -307,6 +307,23 @@ def test_skins_of_one_character(tmp_path: Path) -> None:
     wanted = {"Hips", "Spine", "LeftArm", "LeftHand", "LeftIndex1", "LeftIndex2"}
     assert set(clip.skeleton.names) == wanted | {"hair1", "hair2", "foot", "toe"}
     assert clip.origin.skeleton_path == ""
+
+
+def test_joints_of_several_trees(tmp_path: Path) -> None:
+    """Against the specification, but nothing is lost: each tree gets a root joint."""
+    file = GltfFile()
+    file.animation()
+    left, right = arm(file, file.node("Left")), arm(file, file.node("Right"))
+    file.skin([*left[1:], *right[1:]])
+    file.curve(left[2], "rotation", TIMES, turns(9, 1))
+    file.node("Camera", camera=0)
+    clip = read(file, tmp_path)
+    assert list(np.flatnonzero(clip.skeleton.parents < 0)) == [0, 5]
+    assert clip.skeleton.joints[5] == "Spine_2"
+    pose, oracle = forward_kinematics(clip), Oracle(tmp_path / "take.glb")
+    for joint, node in enumerate([*left[1:], *right[1:]]):
+        place = 100 * oracle.world(node, 0, clip.times[4])[:3, 3]
+        assert np.abs(pose.positions[4, joint] - place).max() < TOLERANCE_CM
 
 
 def test_units_and_axes_by_hand(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from usdhand.formats.gltf.nodes import Tree
 from usdhand.formats.gltf.vrm import Humanoid
 
 MOST_JOINTS = 10_000
-MOST_SKINS = 1_000
+MOST_SKINS = 500
+MOST_SKIN_JOINTS = 200_000  # of all skins together
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +91,8 @@ def find_character(
 
 def read_skins(document: Document, tree: Tree) -> list[Skin]:
     """Read all skins."""
-    found = []
+    found: list[Skin] = []
+    together = 0
     if len(document.lists["skins"]) > MOST_SKINS:
         document.json.refuse(f"has more than {MOST_SKINS} skins, which cannot be meant")
     wearing: dict[int, tuple[int, ...]] = {}
@@ -107,6 +109,8 @@ def read_skins(document: Document, tree: Tree) -> list[Skin]:
             joints.refuse(f"lists {len(nodes)} joints, more than {MOST_JOINTS}")
         if len(set(nodes)) < len(nodes):
             joints.refuse("lists a joint twice")
+        if (together := together + len(nodes)) > MOST_SKIN_JOINTS:
+            joints.refuse(f"and those before it list more than {MOST_SKIN_JOINTS} joints")
         found.append(Skin(tuple(nodes), tree.common(nodes), wearing.get(i, ()), element))
     return found
 
@@ -120,8 +124,7 @@ def _together(tree: Tree, skins: list[Skin]) -> list[list[Skin]]:
             group = _merged(group, i, holder.setdefault(joint, i))
     tops: dict[int, int] = {}
     for i, skin in enumerate(skins):
-        if skin.top >= 0:
-            group = _merged(group, i, tops.setdefault(skin.top, i))
+        group = _merged(group, i, tops.setdefault(skin.top, i))
         # A skin below a joint of another one, as hair is below the head of the body.
         line = [skin.top, *reversed(tree.above(skin.top))]
         above = next((node for node in line if node in holder and node not in skin.joints), None)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.gltf.accessors import read_rows
-from usdhand.formats.gltf.document import Document, Element, listed
+from usdhand.formats.gltf.document import Document, Element, listed, unused
 from usdhand.formats.gltf.nodes import SHORTEST
 from usdhand.motion import Problem
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
 KINDS = {"rotation": "VEC4", "translation": "VEC3", "scale": "VEC3"}
-MOST_NUMBERS = 100_000_000
+LEAST_NUMBERS = 1_000_000  # that any file may hold: sparse accessors need no bytes
 BLOCK = 4096  # frames worked on at a time
 
 
@@ -56,16 +58,14 @@ def moved_nodes(document: Document) -> dict[int, set[int]]:
     return found
 
 
-def names_of(document: Document) -> dict[int, str]:
-    """Names of the animations that move nodes, each one unique."""
-    names: dict[int, str] = {}
-    for i in moved_nodes(document):
-        own = document.lists["animations"][i].text("name") or f"animation_{i}"
-        names[i] = own if own not in names.values() else f"{own}_{i}"
-    return names
+def names_of(document: Document, moving: Iterable[int]) -> dict[int, str]:
+    """Names of some animations, each one unique."""
+    taken: dict[str, int] = {}
+    animations = document.lists["animations"]
+    return {i: unused(animations[i].text("name") or f"animation_{i}", taken) for i in moving}
 
 
-def choose(document: Document, animation: str | None) -> int:
+def choose(path: Path, names: dict[int, str], animation: str | None) -> int:
     """Return the animation of a name, the only one without.
 
     Raises
@@ -75,21 +75,19 @@ def choose(document: Document, animation: str | None) -> int:
     UsageError
         if there are several and none is chosen, or none has that name.
     """
-    names = names_of(document)
     if not names:
-        raise InputError(f"{document.path}: holds no animation of any node.")
+        raise InputError(f"{path}: holds no animation of any node.")
     labels = listed(tuple(names.values()))
     if animation is None:
         if len(names) > 1:
             raise UsageError(
-                f"{document.path}: has {len(names)} animations: {labels}. Choose one with "
-                "--animation NAME."
+                f"{path}: has {len(names)} animations: {labels}. Choose one with --animation NAME."
             )
         return next(iter(names))
     for i, name in names.items():
         if name == animation:
             return i
-    raise UsageError(f"{document.path}: has no animation '{animation}', only {labels}.")
+    raise UsageError(f"{path}: has no animation '{animation}', only {labels}.")
 
 
 def read_curves(
@@ -181,9 +179,10 @@ def _curve(
         index = sampler.need(key).whole(0, len(accessors))
         if (index, kind) not in rows:
             rows[index, kind] = read_rows(document, accessors[index], kind)
-            # Accessors may overlap: a small file can hold endless ones.
-            if sum(values.size for values in rows.values()) > MOST_NUMBERS:
-                sampler.refuse(f"and those before it hold more than {MOST_NUMBERS} numbers")
+            # Accessors may overlap, and a small file could hold endless ones.
+            held = LEAST_NUMBERS + sum(map(len, document.loaded.values()))
+            if sum(values.size for values in rows.values()) > held:
+                sampler.refuse("and those before it need more numbers than the file has bytes")
         return rows[index, kind], accessors[index]
 
     interpolation = sampler.text("interpolation") or "LINEAR"

@@ -290,3 +290,13 @@ def listed(names: tuple[str, ...]) -> str:
     """Some names, for a message."""
     more = "" if len(names) <= MOST_NAMED else f" and {len(names) - MOST_NAMED} more"
     return ", ".join(repr(name) for name in names[:MOST_NAMED]) + more
+
+
+def unused(name: str, taken: dict[str, int]) -> str:
+    """Return a name, with a number if it is taken, and take it; ``taken`` counts the tries."""
+    free = name
+    while free in taken:
+        taken[name] += 1
+        free = f"{name}_{taken[name]}"
+    taken[free] = 1
+    return free

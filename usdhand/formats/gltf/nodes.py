@@ -72,9 +72,10 @@ class Tree:
     def above(self, node: int) -> tuple[int, ...]:
         """Return the nodes above a node, from the root down."""
         found = []
-        while (node := int(self.parents[node])) >= 0:
+        while node >= 0:
             found.append(node)
-        return tuple(reversed(found))
+            node = int(self.parents[node])
+        return tuple(reversed(found[1:]))
 
     def below(self, node: int) -> tuple[int, ...]:
         """Return a node and all nodes below it, parents first."""

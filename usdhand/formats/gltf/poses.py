@@ -35,7 +35,12 @@ def bind_matrices(
         where = skin.element.where
         bind = _in_world(document, tree, skin, holder)
         if bind is None:
-            message = "inverse bind matrices are missing or contradict the nodes: not used"
+            absent = skin.element.get("inverseBindMatrices") is None
+            message = (
+                "there are no inverse bind matrices: the default pose stands in for the bind pose"
+                if absent
+                else "the inverse bind matrices make no pose of these bones: they are not used"
+            )
             problems.append(Problem("missing-bind", message, where))
             continue
         apart = [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from usdhand.errors import InputError
 from usdhand.formats.gltf.characters import Character, find_character
 from usdhand.formats.gltf.curves import choose, moved_nodes, names_of, read_curves
-from usdhand.formats.gltf.document import Document, read_document
+from usdhand.formats.gltf.document import Document, read_document, unused
 from usdhand.formats.gltf.nodes import Tree, matrices, read_tree
 from usdhand.formats.gltf.placement import Motion, Space, find_placement, placed, sampled
 from usdhand.formats.gltf.poses import bind_matrices
@@ -54,7 +54,7 @@ def read_clip(
     """
     with np.errstate(all="ignore"):  # whatever is no number is refused by name
         scene = _scene(path, skel)
-        return _animated(scene, choose(scene.document, animation), cm_per_unit, up)
+        return _animated(scene, animation, cm_per_unit, up)
 
 
 def read_character(
@@ -76,7 +76,8 @@ def animation_names(path: Path) -> tuple[str, ...]:
     InputError
         if the file is damaged.
     """
-    return tuple(names_of(read_document(path)).values())
+    document = read_document(path)
+    return tuple(names_of(document, moved_nodes(document)).values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,7 @@ class _Scene:
     document: Document
     tree: Tree
     humanoid: Humanoid
+    moving: dict[int, set[int]]  # by the number of the animation
     character: Character
 
     @property
@@ -102,15 +104,18 @@ class _Scene:
 def _scene(path: Path, skel: str | None) -> _Scene:
     document = read_document(path)
     tree, humanoid = read_tree(document), read_humanoid(document)
-    moving: set[int] = set().union(*moved_nodes(document).values())
-    return _Scene(document, tree, humanoid, find_character(document, tree, humanoid, moving, skel))
+    moving = moved_nodes(document)
+    moved: set[int] = set().union(*moving.values())
+    character = find_character(document, tree, humanoid, moved, skel)
+    return _Scene(document, tree, humanoid, moving, character)
 
 
-def _animated(scene: _Scene, number: int, cm: float | None, up: str | None) -> Clip:
-    document, tree, nodes = scene.document, scene.tree, scene.nodes
-    parents = scene.parents
+def _animated(scene: _Scene, animation: str | None, cm: float | None, up: str | None) -> Clip:
+    document, tree, nodes, parents = scene.document, scene.tree, scene.nodes, scene.parents
+    names = names_of(document, scene.moving)
+    number = choose(document.path, names, animation)
+    name = names[number]
     above = {node for joint in np.flatnonzero(parents < 0) for node in tree.above(nodes[joint])}
-    name = names_of(document)[number]
     curves, problems = read_curves(
         document, document.lists["animations"][number], above | set(nodes)
     )
@@ -196,16 +201,11 @@ def _space(cm: float | None, up: str | None) -> Space:
 def _joint_paths(scene: _Scene) -> tuple[str, ...]:
     """Full paths of the joints; of siblings with one name the later ones get a number."""
     paths: list[str] = []
-    taken: set[str] = set()
+    taken: dict[str, int] = {}
     letters = 0
     for node, parent in zip(scene.nodes, scene.parents, strict=True):
         holder = f"{paths[parent]}/" if parent >= 0 else ""
-        path = whole = holder + scene.tree.name(node)
-        number = 1
-        while path in taken:
-            number += 1
-            path = f"{whole}_{number}"
-        taken.add(path)
+        path = unused(holder + scene.tree.name(node), taken)
         paths.append(path)
         letters += len(path)
         if letters > MOST_PATH_LETTERS:

@@ -196,23 +196,24 @@ def _animation(clip: Clip, times: Array, rest: _Rest, numbers: _Numbers) -> dict
         channels.append({"sampler": len(samplers) - 1, "target": target})
 
     # One curve has a key at every frame, so that the frame rate and the length are kept.
-    root = clip.skeleton.order[0]
-    rotations = rot.make_continuous(clip.rotations)
+    turning = _moving(clip.rotations, STILL_TURN)
+    turning[clip.skeleton.order[0]] = True
+    moving, growing = _moving(clip.translations, STILL_CM), _moving(clip.scales, STILL_SCALE)
     for joint in range(len(clip.skeleton)):
-        q, t = rotations[:, joint], clip.translations[:, joint]
-        channel(joint, "rotation", q, joint == root or _moves(q, STILL_TURN))
-        moves = _moves(t, STILL_CM)
-        if moves or np.abs(t[0] - rest.translation[joint]).max() > STILL_CM:
-            channel(joint, "translation", t * METRES, moves)
-        s = clip.scales[:, joint]
-        moves = _moves(s, STILL_SCALE)
-        if moves or np.abs(s[0] - rest.scale[joint]).max() > STILL_SCALE:
-            channel(joint, "scale", s, moves)
+        channel(joint, "rotation", rot.make_continuous(clip.rotations[:, joint]), turning[joint])
+        t, s = clip.translations[:, joint], clip.scales[:, joint]
+        if moving[joint] or np.abs(t[0] - rest.translation[joint]).max() > STILL_CM:
+            channel(joint, "translation", t * METRES, moving[joint])
+        if growing[joint] or np.abs(s[0] - rest.scale[joint]).max() > STILL_SCALE:
+            channel(joint, "scale", s, growing[joint])
     return {"name": clip.name or "Motion", "samplers": samplers, "channels": channels}
 
 
-def _moves(values: Array, still: float) -> bool:
-    return bool(np.ptp(values, axis=0).max() > still)
+def _moving(values: Array, still: float) -> NDArray[np.bool_]:
+    """Which joints (joints,) have values (frames, joints, n) that change."""
+    if values.strides[0] == 0:  # a view of one row for all frames
+        return np.zeros(values.shape[1], dtype=bool)
+    return np.asarray(np.ptp(values, axis=0).max(axis=1) > still)
 
 
 def _json(document: dict[str, Any]) -> bytes:
