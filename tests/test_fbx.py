@@ -245,6 +245,13 @@ def test_what_stands_above_becomes_part_of_the_roots(tmp_path: Path) -> None:
     assert clip.origin.skeleton_path == ""
 
 
+def test_only_what_stands_above_moves(tmp_path: Path) -> None:
+    above = Node("Cart", kind="Null", keys={("Lcl Translation", "X"): [(0.0, 0.0), (1.0, 50.0)]})
+    nodes = [above, *(replace(node, keys={}) for node in chain(start=0))]
+    clip = read.read_clip(write_fbx(tmp_path / "a.fbx", nodes))
+    assert np.allclose(np.ptp(world(clip), axis=0), [50.0, 0.0, 0.0])
+
+
 def test_nulls_between_joints_are_joints(tmp_path: Path) -> None:
     nodes = [*chain("Hips Group Head"), Node("Prop", 2, "Null"), Node("Mesh", -1, "Mesh")]
     nodes[1] = replace(nodes[1], kind="Null")

@@ -54,7 +54,7 @@ def read_clip(
     sampled = find_take(scene, animation)
     take = sampled.take
     rig = find_rig(scene, skel, take.moved)
-    if take.moved.isdisjoint(rig.nodes):
+    if not rig.moves(take.moved):
         name = rig.name or rig.joints[0]
         raise InputError(f"{path}: the animation '{take.name}' does not move '{name}'.")
     local, odd = joint_locals(scene, rig.nodes, sampled.transforms)

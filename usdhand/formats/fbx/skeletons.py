@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.fbx.scene import Sampled, Scene
@@ -17,13 +17,19 @@ LIMBS = 3  # joints that a chain needs to be a limb
 class Rig:
     """One skeleton of a scene: a name for it, its joints as nodes and as full paths.
 
-    Joints come depth first, as in the file. ``name`` is "" where it is the only one.
+    Joints come depth first, as in the file; ``above`` are the nodes over the roots. ``name`` is ""
+    where it is the only one.
     """
 
     name: str
     nodes: tuple[int, ...]
     joints: tuple[str, ...]
+    above: tuple[int, ...]
     problems: tuple[Problem, ...] = ()
+
+    def moves(self, moved: frozenset[int]) -> bool:
+        """Whether any of these nodes moves it."""
+        return not moved.isdisjoint((*self.nodes, *self.above))
 
 
 def find_rig(scene: Scene, skel: str | None, moved: frozenset[int]) -> Rig:
@@ -41,7 +47,9 @@ def find_rig(scene: Scene, skel: str | None, moved: frozenset[int]) -> Rig:
     joints, problems = _joint_nodes(scene, moved)
     rigs = [_rig(scene, nodes, joints) for nodes in _groups(scene, joints)]
     names = unique(rig.name for rig in rigs)
-    rigs = [Rig(name, r.nodes, r.joints, problems) for name, r in zip(names, rigs, strict=True)]
+    rigs = [
+        replace(rig, name=name, problems=problems) for name, rig in zip(names, rigs, strict=True)
+    ]
     if skel is not None:
         chosen = [r for r in rigs if skel == r.name] or [r for r in rigs if skel in r.joints]
         if len(chosen) != 1:
@@ -52,7 +60,7 @@ def find_rig(scene: Scene, skel: str | None, moved: frozenset[int]) -> Rig:
             listed = _listed([r.name for r in chosen])
             raise UsageError(f"{scene.path} has several skeletons: {listed}. Choose: --skel NAME")
     [rig] = chosen
-    return rig if len(rigs) > 1 else Rig("", rig.nodes, rig.joints, rig.problems)
+    return rig if len(rigs) > 1 else replace(rig, name="")
 
 
 def find_take(scene: Scene, animation: str | None) -> Sampled:
@@ -138,15 +146,19 @@ def _rig(scene: Scene, roots: Sequence[int], joints: frozenset[int]) -> Rig:
         children.setdefault(int(scene.parents[node]), []).append(node)
     nodes: list[int] = []
     paths: list[str] = []
-    above = int(scene.parents[roots[0]])
+    above: list[int] = []
+    node = int(scene.parents[roots[0]])
+    while node > 0:
+        above.append(node)
+        node = int(scene.parents[node])
     waiting = _named(scene, roots, "")
     while waiting:
         node, path = waiting.pop()
         nodes.append(node)
         paths.append(path)
         waiting += _named(scene, children.get(node, []), path + "/")
-    name = scene.names[above] if above > 0 else paths[0]
-    return Rig(name or "skeleton", tuple(nodes), tuple(paths))
+    name = scene.names[above[0]] if above else paths[0]
+    return Rig(name or "skeleton", tuple(nodes), tuple(paths), tuple(above))
 
 
 def _named(scene: Scene, nodes: Sequence[int], prefix: str) -> list[tuple[int, str]]:
@@ -157,7 +169,7 @@ def _named(scene: Scene, nodes: Sequence[int], prefix: str) -> list[tuple[int, s
 
 def _likely(rigs: list[Rig], moved: frozenset[int]) -> list[Rig]:
     """Rigs that may be meant: each preference holds only while some rig fulfils it."""
-    rigs = [rig for rig in rigs if not moved.isdisjoint(rig.nodes)] or rigs
+    rigs = [rig for rig in rigs if rig.moves(moved)] or rigs
     return [rig for rig in rigs if len(rig.nodes) >= LIMBS] or rigs
 
 
