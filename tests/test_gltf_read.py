@@ -309,6 +309,22 @@ def test_skins_of_one_character(tmp_path: Path) -> None:
     assert clip.origin.skeleton_path == ""
 
 
+def test_skins_that_name_one_root(tmp_path: Path) -> None:
+    """Two gloves below hips that no skin uses."""
+    file = GltfFile()
+    hips = file.node("Hips")
+    gloves = [arm(file, hips, [f"{side}{i}" for i in range(3)]) for side in "LR"]
+    for joints in gloves:
+        file.skin(joints)
+    path = file.write(tmp_path / "gloves.glb")
+    with pytest.raises(UsageError, match="2 skeletons: 'L0', 'R0'"):
+        read_character(path)
+    for skin in file.json["skins"]:
+        skin["skeleton"] = hips
+    clip = read_character(file.write(path))
+    assert clip.skeleton.names == ("L0", "L1", "L2", "R0", "R1", "R2")
+
+
 def test_joints_of_several_trees(tmp_path: Path) -> None:
     """Against the specification, but nothing is lost: each tree gets a root joint."""
     file = GltfFile()

@@ -123,8 +123,13 @@ def _together(tree: Tree, skins: list[Skin]) -> list[list[Skin]]:
         for joint in skin.joints:
             group = _merged(group, i, holder.setdefault(joint, i))
     tops: dict[int, int] = {}
+    roots: dict[int, int] = {}
     for i, skin in enumerate(skins):
         group = _merged(group, i, tops.setdefault(skin.top, i))
+        # Parts of one body may share no joint, but name the same root.
+        root = skin.element.reference("skeleton", len(tree))
+        if root is not None:
+            group = _merged(group, i, roots.setdefault(root, i))
         # A skin below a joint of another one, as hair is below the head of the body.
         line = [skin.top, *reversed(tree.above(skin.top))]
         above = next((node for node in line if node in holder and node not in skin.joints), None)

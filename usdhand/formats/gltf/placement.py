@@ -15,7 +15,7 @@ from usdhand.motion import Problem
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
-UNEVEN_SCALE = 1e-3  # relative: what rounding leaves in scales that are meant to be even
+UNEVEN_SCALE = 2e-6  # relative: what rounding leaves of scales that are meant to be even
 UNEVEN_ABOVE = 0.01
 SMALLEST_SCALE = 1e-12
 
