@@ -82,15 +82,14 @@ def write_rig(
     Raises the errors of `write_motion`.
     """
     frames = reduction.hands.frames.values()
-    skeleton = reduction.clip.origin.skeleton_path
-    stage = character.stage
-    old = [p.GetPath() for p in rig_prims(stage) if _skeleton_path(p) in (skeleton, None)]
+    stage, skeleton = character.stage, character.skeleton.GetPath()
+    old = [p.GetPath() for p in rig_prims(stage) if _skeleton_path(p) in (str(skeleton), None)]
 
     def author(layer: Sdf.Layer, root: Sdf.Path) -> None:
         # A rig that the input has would shine through the new one: it is put aside.
         for path in old:
             Sdf.CreatePrimInLayer(layer, path).SetInfo("active", False)
-        author_rig(layer, free_child(stage, root, RIG_NAME), reduction)
+        author_rig(layer, free_child(stage, root, RIG_NAME), reduction, skeleton)
 
     write_motion(
         character,

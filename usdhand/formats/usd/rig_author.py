@@ -17,7 +17,9 @@ HELD = "held"
 _TYPES = Sdf.ValueTypeNames
 
 
-def author_rig(layer: Sdf.Layer, path: Sdf.Path, reduction: Reduction) -> None:
+def author_rig(
+    layer: Sdf.Layer, path: Sdf.Path, reduction: Reduction, skeleton_path: Sdf.Path
+) -> None:
     """Write a rig as a Scope at ``path``: explicit custom attributes, typed by the schema."""
     rig, clip = reduction.rig, reduction.clip
     prim = Sdf.CreatePrimInLayer(layer, path)
@@ -29,7 +31,7 @@ def author_rig(layer: Sdf.Layer, path: Sdf.Path, reduction: Reduction) -> None:
     prim.SetInfo("apiSchemas", schemas)
 
     skeleton = Sdf.RelationshipSpec(prim, "usdhand:skeleton", custom=True)
-    skeleton.targetPathList.explicitItems = [Sdf.Path(clip.origin.skeleton_path)]
+    skeleton.targetPathList.explicitItems = [skeleton_path]
     _set(prim, "usdhand:version", _TYPES.Int, VERSION)
     _set(prim, "usdhand:fit", _TYPES.Token, rig.fit)
     _set(prim, "usdhand:rangeThreshold", _TYPES.Double, rig.range_threshold)
