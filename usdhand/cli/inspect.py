@@ -87,9 +87,10 @@ def _inspect(path: Path, skel: str | None, conventions: Conventions | None) -> d
 
 
 def _text(result: dict[str, Any], verbose: bool) -> str:
+    skeleton = f"skeleton {result['skeleton']}, " if result["skeleton"] else ""
     lines = [
         f"{result['path']}",
-        f"  skeleton {result['skeleton']}, {result['joints']} joints, "
+        f"  {skeleton}{result['joints']} joints, "
         f"{result['cm_per_unit']:g} cm a unit, {result['up_axis']} up",
     ]
     if result["animation"]:
