@@ -235,7 +235,7 @@ def _fill_part(
         fingers = limited(joined, low, high, fps)
         alternatives.append(Alternative(names, fingers, choices, path.cost, seams))
     candidates = int(np.isin(space.clips, list(usable)).sum())
-    return FilledPart(part, tuple(joints), space, candidates, tuple(alternatives))
+    return FilledPart(part, tuple(joints), space, candidates, network, tuple(alternatives))
 
 
 def _choices(

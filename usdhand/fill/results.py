@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from usdhand.anatomy import Side
 from usdhand.fill.candidates import Candidate, SearchSpace
+from usdhand.fill.choose import Graph
 from usdhand.fill.library import Part
 from usdhand.fill.settings import FillSettings
 from usdhand.motion import Clip
@@ -49,13 +50,15 @@ class Alternative:
 class FilledPart:
     """A part of the body and the ways in which it was filled, best first.
 
-    ``joints`` are those that were filled, a hand each; ``usable`` segments could be chosen from.
+    ``joints`` are those that were filled, a hand each; ``usable`` segments could be chosen from;
+    the alternatives are paths through ``network``.
     """
 
     part: Part
     joints: tuple[tuple[str, ...], ...]
     space: SearchSpace
     usable: int
+    network: Graph
     alternatives: tuple[Alternative, ...]
 
 

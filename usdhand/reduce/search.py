@@ -76,6 +76,19 @@ def thresholds_for_error(statistics: Statistics, most: float, fit: Fit = "paper"
     return best[1] if best else Thresholds(0.0, 0.0)
 
 
+def errors_by_count(statistics: Statistics, fit: Fit = "paper") -> Array:
+    """(n + 1,) smallest RMS error in degrees over all channels with 0 to n of them free.
+
+    nan where no thresholds leave exactly as many.
+    """
+    n = len(statistics.mean)
+    squared = np.full(n + 1, np.inf)
+    for limit, _, roots in _options(statistics):
+        errors = np.sum(_errors(statistics, limit, roots, fit) ** 2, axis=1)
+        np.minimum.at(squared, _free(statistics, limit, roots), errors)
+    return np.sqrt(np.where(np.isfinite(squared), squared, np.nan) / max(n, 1))
+
+
 def channel_errors(statistics: Statistics, thresholds: Thresholds, fit: Fit) -> Array:
     """(n,) RMS error in degrees of every channel, without making a single curve."""
     roots = controllers_at(statistics, thresholds.range, np.array([thresholds.rmsd]))
