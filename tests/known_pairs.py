@@ -7,6 +7,7 @@ The hand clip is the same take on another rig where there is one, retimed by a s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import numpy as np
 from usdhand.anatomy import Channels, Hands, Side
 from usdhand.api import find_hands, read_clip
 from usdhand.compare import find_lag
-from usdhand.motion import Clip, forward_kinematics
+from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.motion.rotations import Array
@@ -138,6 +139,45 @@ def noisy(clip: Clip, hands: Hands, random: np.random.Generator, noise_cm: float
         half = np.concatenate([wobble / 2, np.ones((len(clip), 1))], axis=-1)
         q[:, hand.wrist] = rot.normalize(rot.multiply(q[:, hand.wrist], half))
     return replace(clip, rotations=q, translations=t)
+
+
+def with_other_axes(clip: Clip, seed: int) -> Clip:
+    """The same motion on a rig of which every joint has other axes, at bind and rest too."""
+    skeleton = clip.skeleton
+    turn = rot.normalize(np.random.default_rng(seed).normal(size=(len(skeleton), 4)))
+    above = np.where((skeleton.parents >= 0)[:, None], turn[skeleton.parents], rot.IDENTITY)
+    after, before = (np.tile(np.eye(4), (len(skeleton), 1, 1)) for _ in range(2))
+    after[:, :3, :3] = rot.to_matrix(turn)
+    before[:, :3, :3] = rot.to_matrix(rot.conjugate(above))
+    rotations = rot.multiply(rot.multiply(rot.conjugate(above), clip.rotations), turn)
+    return replace(
+        clip,
+        skeleton=replace(skeleton, bind=skeleton.bind @ after, rest=before @ skeleton.rest @ after),
+        rotations=rot.make_continuous(rotations),
+        translations=rot.rotate(rot.conjugate(above), clip.translations),
+    )
+
+
+def arms_only(clip: Clip, joints: Sequence[int]) -> Clip:
+    """The clip with these joints and all below them; they move through the room."""
+    skeleton = clip.skeleton
+    keep = [j for j in range(len(skeleton)) if {j, *skeleton.ancestors(j)}.intersection(joints)]
+    index = {j: k for k, j in enumerate(keep)}
+    parents = np.array([index.get(int(skeleton.parents[j]), -1) for j in keep])
+    paths: list[str] = []
+    for j, parent in zip(keep, parents, strict=True):
+        name = skeleton.names[j]
+        paths.append(name if parent < 0 else f"{paths[parent]}/{name}")
+    q, t, s = (v[:, keep].copy() for v in (clip.rotations, clip.translations, clip.scales))
+    rest = skeleton.rest[keep].copy()
+    pose = forward_kinematics(clip, dict.fromkeys(joints))
+    for joint in joints:
+        k = index[joint]
+        q[:, k] = rot.make_continuous(pose.rotation(joint))
+        t[:, k], rest[k] = pose.position(joint), skeleton.bind[joint]
+        s[:, k] *= clip.scales[:, skeleton.ancestors(joint)].prod(axis=1)
+    rig = Skeleton(tuple(paths), parents, skeleton.bind[keep], rest)
+    return replace(clip, skeleton=rig, rotations=q, translations=t, scales=s)
 
 
 def _trimmed(a: Clip, b: Clip, hands_a: Hands, hands_b: Hands) -> tuple[Clip, Clip]:

@@ -12,7 +12,10 @@ from scipy.spatial.transform import Rotation
 from usdhand.alignment.phase_dtw import phase_path, sign_costs, signs_along, turn_angles
 from usdhand.errors import UsageError
 from usdhand.splice.band import Pin, anchors_of, band_along, checked_pins, pinned_band
-from usdhand.splice.method import through_pins
+from usdhand.splice.markers import Markers
+from usdhand.splice.phases import smoothed
+from usdhand.splice.refine import refined
+from usdhand.splice.warps import EXACT, stiff, through_pins
 
 NO_TURN = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
 
@@ -114,6 +117,59 @@ def test_a_long_path_through_a_narrow_band() -> None:
     assert cost == 0
     assert (first == np.arange(n)).all()
     assert (last == first).all()
+
+
+def test_costs_along_a_path_are_those_of_its_cells() -> None:
+    random = np.random.default_rng(4)
+    p, q = random.integers(-1, 2, (40, 64)), random.integers(-1, 2, (50, 64))
+    columns = random.integers(0, 50, 40)
+    costs = sign_costs(words(p), words(q), columns)
+    assert costs.tolist() == [distance_of_signs(p[i], q[j]) for i, j in enumerate(columns)]
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 60])
+def test_a_stiff_curve_is_the_least_squares_one(n: int) -> None:
+    random = np.random.default_rng(n)
+    values, weights = random.normal(size=n), random.uniform(0.1, 1.0, n)
+    bend = np.diff(np.eye(n), n=2, axis=0)
+    wanted = np.linalg.solve(np.diag(weights) + 7.0 * bend.T @ bend, weights * values)
+    assert np.allclose(stiff(values, weights, 7.0), wanted)
+    weights[1] = EXACT
+    assert abs(stiff(values, weights, 7.0)[1] - values[1]) < 1e-6
+
+
+def test_wide_smoothing_is_nearly_gaussian() -> None:
+    pulse = np.zeros(801)
+    pulse[400] = 1.0
+    t = np.arange(-400, 401)
+    gauss = np.exp(-((t / 60.0) ** 2) / 2) / (60.0 * np.sqrt(2 * np.pi))
+    found = smoothed(pulse, 60.0)
+    assert np.abs(found - gauss).max() < 0.08 * gauss.max()
+    assert abs(np.sqrt(np.sum(found * t**2)) - 60.0) < 1.0
+
+
+def moving_hand(seconds: np.ndarray) -> Markers:
+    """Markers of a hand that moves and bends, at these moments of it."""
+    t = seconds[:, None] * [1.0, 1.3, 0.7] * 2 * np.pi * 0.6
+    wrist = 15.0 * np.sin(t + np.arange(3.0))
+    bend = 0.4 * np.sin(t[:, :1] * 1.4)
+    forearm = np.concatenate([np.sin(bend), 0 * bend, np.cos(bend)], axis=1)
+    around = np.array([[4.0, 0.0, 0.0], [-4.0, 0.0, 0.0], [0.0, 0.0, -18.0], [0.0, 0.0, 13.0]])
+    return Markers(wrist[:, None] + around, wrist, forearm, None, 60.0, "shoulder")
+
+
+def test_pass_2_finds_parts_of_a_frame_and_stays_where_it_may_not_move() -> None:
+    rows = np.arange(300.0)
+    shift = 3.3 * np.sin(np.pi * rows / 299) ** 2
+    body, hand = moving_hand((rows + shift) / 60.0), moving_hand(rows / 60.0)
+    room = np.full(300, 12.0)
+    found = refined(body, hand, rows, room, "local", 7.0) - rows
+    assert np.abs(found - shift)[10:-10].max() < 0.5
+    assert np.abs(found - shift).mean() < 0.1
+    room[150] = 0.0
+    assert abs(refined(body, hand, rows, room, "local", 7.0)[150] - 150.0) < 1e-6
+    still = moving_hand(np.zeros(300))
+    assert np.abs(refined(still, still, rows, room, "local", 7.0) - rows).max() < 1e-6
 
 
 def test_pins_that_cannot_hold_are_named() -> None:

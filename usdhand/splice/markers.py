@@ -46,6 +46,11 @@ class Markers:
     def __len__(self) -> int:
         return len(self.positions)
 
+    @property
+    def palm_length(self) -> float:
+        """From the wrist to the middle knuckle: what is far and near for this character."""
+        return float(np.linalg.norm(self.positions[0, 3] - self.wrist[0])) / ALONG_HAND
+
 
 def hand_markers(clip: Clip, hands: Hands, side: Side, fps: float) -> Markers:
     """Markers of one hand at an analysis rate, over the clip's time from its first frame."""

@@ -30,10 +30,10 @@ from usdhand.splice.warps import through_pins
 
 Wrist = Literal["body", "hands"]
 
-# A hand whose wrist stays within this of its mean, in cm, does not move.
-STILL_CM = 1.0
-# However long the clips, steadier turns do not make the path of pass 1 another by more seconds.
-MOST_REACH_S = 5.0
+# A hand whose wrist stays within this of its mean, in lengths of the palm, does not move.
+STILL = 0.1
+# The band of pass 2 is not wider, in seconds, however long the clips.
+MOST_BAND_S = 10.0
 # Rounds of matching signs with the hand clip in the body's time.
 ROUNDS = 2
 
@@ -45,8 +45,8 @@ class SpliceSettings:
     Attributes
     ----------
     band : widths of the bands of pass 1 and pass 2, as shares of the body's length
-    least_band : seconds that the band of pass 1 has at least: performers of short clips are off
-        by as much as those of long ones
+    least_band : seconds that bands have at least: performers of short clips are off by as much as
+        those of long ones
     pins : moments that belong together
     align : "local" fits a turn about the vertical wherever motions are compared, "trunk" measures
         it from the trunks
@@ -69,7 +69,7 @@ class SpliceSettings:
     smoothing: float = 0.045
     shared_smoothing: float = 0.065
     dead_zone: float = 0.06
-    tether: float = 0.12
+    tether: float = 0.3
 
     def __post_init__(self) -> None:
         if not all(0.0 < width <= 1.0 for width in self.band):
@@ -179,9 +179,9 @@ def align(
     band = _band(len(body), len(hand), settings, pins)
     signs = settings.smoothing, settings.dead_zone
     path = phase_path(body, hand, band, *signs, settings.align, settings.directions)
+    reach = min(settings.band[1] * len(body), MOST_BAND_S * settings.fps)
+    reach = max(reach, settings.least_band * settings.fps) / 2
     if settings.align == "local":
-        reach = min(settings.band[1] * len(body) / 2, MOST_REACH_S * settings.fps)
-        reach = max(reach, settings.least_band * settings.fps / 2)
         near = band_along(path.middle, band, reach)
         path = steadied(body, hand, path, near, *signs, settings.directions)
     own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps
@@ -201,7 +201,6 @@ def align(
     if settings.tether == 0:
         return in_time(first), in_time(first), path.cost
     tether = settings.tether * hand.fps
-    reach = min(settings.band[1] * len(body) / 2, 2 * tether)
     first = through_pins(first / hand.fps, own_times, pins) * hand.fps
     second = refined(body, hand, first, np.minimum(room * hand.fps, reach), settings.align, tether)
     return in_time(second), in_time(first), path.cost
@@ -272,7 +271,9 @@ def _aligned(
 def is_still(markers: Markers, smoothing: float) -> bool:
     """Whether a wrist stays where it is."""
     wrist = smoothed(markers.wrist, smoothing * markers.fps)
-    return bool(np.linalg.norm(wrist - wrist.mean(axis=0), axis=-1).max() < STILL_CM)
+    return bool(
+        np.linalg.norm(wrist - wrist.mean(axis=0), axis=-1).max() < STILL * markers.palm_length
+    )
 
 
 def _following(alignment: Alignment, side: Side, pins: tuple[Pin, ...], times: Array) -> Alignment:

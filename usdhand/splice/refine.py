@@ -15,11 +15,11 @@ from usdhand.splice.warps import EXACT, monotone, stiff
 # directions are compared around, as performers stand and reach differently; of the time over which
 # they move with the same amplitude; and of that over which they differ by as much.
 SMOOTHING_S, AROUND_S, AMPLITUDE_S, NOISE_S = 0.033, 1.0, 0.75, 0.33
-# Differences below these, in radians and cm, are no smaller noise.
-LEAST_ANGLE, LEAST_CM = np.radians(1.0), 0.05
+# Differences below these, in radians and lengths of the palm, are no smaller noise.
+LEAST_ANGLE, LEAST_PATH = np.radians(1.0), 0.005
 STIFFNESS = 300.0
 # Rounds of the linearised problem; more change the median error by less than 0.1 ms.
-ROUNDS = 3
+ROUNDS = 4
 
 
 def refined(
@@ -31,7 +31,8 @@ def refined(
     between the forearms in the axes of the palms and needs no alignment. Where a wrist hardly
     bends this says nothing, so that the palm's directions and the wrist's path have a say as well.
     Each is weighed by how well it agrees there, and a warp is bent no more than this is worth:
-    what hardly changes, or differs anyway, has no say.
+    what hardly changes, or differs anyway, has no say. Only the first round weighs by how well it
+    agrees on the whole, since then a lag would pass for a difference.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def refined(
     independent = 1.0 / (2.0 * np.sqrt(np.pi) * SMOOTHING_S * fps)  # smoothed noise, frame by frame
     held = np.where(room > 0, 1.0 / tether**2, EXACT)
     moved = np.zeros(len(body))
-    for _ in range(ROUNDS):
+    for again in range(ROUNDS):
         now = monotone(warp + moved)
         pair = alike(body, shown_at(hand, now, fps), align)
         slope = np.maximum(np.gradient(now), 0.1)[:, None]
@@ -50,8 +51,9 @@ def refined(
         for ours, theirs, least in _compared(*pair):
             rate, apart = np.gradient(ours, axis=0) / slope, ours - theirs
             squares = _dot(apart, apart) / apart.shape[1]
-            usual = max(float(np.median(squares)), least**2)
-            noise = np.maximum(usual, smoothed(squares, NOISE_S * fps))
+            noise = np.full(len(squares), max(float(np.median(squares)), least**2))
+            if again:
+                noise = np.maximum(noise, smoothed(squares, NOISE_S * fps))
             information += independent * _dot(rate, rate) / noise
             pull += independent * _dot(rate, apart) / noise
         weights = information + held
@@ -77,7 +79,7 @@ def _compared(body: Markers, hand: Markers) -> Iterator[tuple[Array, Array, floa
     ours, theirs = (around(w) for w in wrists)
     both = np.stack([_dot(ours, theirs), _dot(theirs, theirs)], axis=1)
     both = np.maximum(smoothed(both, AMPLITUDE_S * fps), 1e-9)
-    yield ours, theirs * (both[:, :1] / both[:, 1:]), LEAST_CM
+    yield ours, theirs * (both[:, :1] / both[:, 1:]), LEAST_PATH * body.palm_length
 
 
 def _dot(a: Array, b: Array) -> Array:
