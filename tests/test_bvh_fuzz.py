@@ -88,7 +88,7 @@ def mutations(folder: Path, count: int, seed: int) -> None:
 
 
 def test_mutations(tmp_path: Path) -> None:
-    mutations(tmp_path, 400, 1)
+    mutations(tmp_path, 300, 1)
 
 
 @pytest.mark.slow
@@ -111,10 +111,10 @@ def test_words_in_any_order(tmp_path_factory: pytest.TempPathFactory, words: lis
         ARM.replace("CHANNELS 6", "CHANNELS 1000000000"),
         ARM.replace("Hips", "H" * 4_000_000),
         "HIERARCHY" + " " * 4_000_000,
-        "HIERARCHY\n" + "# x\n" * 1_000_000,
+        "HIERARCHY\n" + "# x\n" * 500_000,
         "HIERARCHY ROOT a " + "{" * 1_000_000,
-        "HIERARCHY " + "ROOT a{OFFSET 0 0 0}" * 400_000,
-        "HIERARCHY ROOT a{OFFSET 0 0 0 " + "JOINT a{OFFSET 0 1 0 " * 400_000,
+        "HIERARCHY " + "ROOT a{OFFSET 0 0 0}" * 200_000,
+        "HIERARCHY ROOT a{OFFSET 0 0 0 " + "JOINT a{OFFSET 0 1 0 " * 200_000,
         ARM + "\n" * 4_000_000,
         ARM + "1 " * 2_000_000,
         ARM.replace("0 91 0", "9" * 4_000_000),

@@ -64,7 +64,8 @@ def parse_file(path: Path) -> BvhFile:
             rows = None
             # A number and what parts it from the next take two bytes.
             if size > _large() and 0 < declared * hierarchy.width <= size // 2:
-                rows = compiled_rows(data[start:], file, shape)
+                file.seek(start)
+                rows = compiled_rows(file, shape)
             else:
                 data += file.read()
         if rows is None:

@@ -7,13 +7,9 @@ twenty times faster on large files that are as they should be, and leaves all ot
 from __future__ import annotations
 
 import math
-import os
 import re
 from array import array
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
-from itertools import chain
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -23,7 +19,6 @@ from usdhand.motion.rotations import Array
 
 LARGEST_VALUE = 1e9  # what is beyond is damage, and squares of it overflow
 CHUNK = 1 << 20  # bytes; small enough to stay in the processor's cache
-LONGEST_LINE = 64 * CHUNK
 
 _LINE = re.compile(rb"[^\r\n]+")
 _WORD = re.compile(rb"\S+")
@@ -94,55 +89,41 @@ def _usable(word: bytes) -> bool:
         return False
 
 
-def compiled_rows(head: bytes, file: BinaryIO, shape: tuple[int, int]) -> Array | None:
+def compiled_rows(file: BinaryIO, shape: tuple[int, int]) -> Array | None:
     """Numbers of a regular file of just so many rows, a row a line; None for any other.
 
-    Parameters
-    ----------
-    head : what was read of the rows already
-    file : goes on behind it
+    ``file`` stands where the rows start.
     """
     rows, parse = np.empty(shape), _kernel()
-    filled, jobs = 0, list[tuple[int, "Future[int]"]]()
-    with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
-        for text in _whole_lines(head, file):
-            part = rows[filled : filled + text.count(b"\n")]
-            jobs.append((len(part), pool.submit(parse, np.frombuffer(text, np.uint8), part)))
-            filled += len(part)
-    for expected, job in jobs:
-        if job.result() != expected:
+    values = rows.reshape(-1)
+    buffer = bytearray(CHUNK + 1)  # whole lines, and the beginning of the next one
+    view, text = memoryview(buffer), np.frombuffer(buffer, dtype=np.uint8)
+    filled = kept = 0
+    while count := file.readinto(view[kept:CHUNK]):  # type: ignore[attr-defined]
+        size = kept + count
+        end = buffer.rfind(b"\n", 0, size) + 1
+        filled = parse(text, end, values, filled, shape[1])
+        if filled < 0:
             return None
-    usable = rows.min() >= -LARGEST_VALUE and rows.max() <= LARGEST_VALUE
-    return rows if filled == len(rows) and usable else None
+        kept = size - end
+        buffer[:kept] = buffer[end:size]
+    if kept == CHUNK:  # a line that does not fit
+        return None
+    buffer[kept] = ord("\n")
+    return rows if parse(text, kept + 1, values, filled, shape[1]) == rows.size else None
 
 
-def _whole_lines(head: bytes, file: BinaryIO) -> Iterator[bytes]:
-    """Pieces of a file that end where lines do."""
-    rest = b""
-    begun = (head[start : start + CHUNK] for start in range(0, len(head), CHUNK))
-    for piece in chain(begun, iter(lambda: file.read(CHUNK), b"")):
-        text = rest + piece
-        end = text.rfind(b"\n") + 1
-        if not end and len(text) > LONGEST_LINE:
-            rest = text
-            break
-        rest = text[end:]
-        yield text[:end]
-    if rest.strip():
-        yield rest + b"\n"
+def _fill_values(
+    text: NDArray[np.uint8], length: int, values: NDArray[np.float64], filled: int, width: int
+) -> int:
+    """Parse whole lines into ``values`` from ``filled`` on; how many are filled then.
 
-
-def _fill_rows(text: NDArray[np.uint8], rows: NDArray[np.float64]) -> int:
-    """Parse numbers into ``rows``, a row a line; how many rows, or -1 for what is not regular.
-
-    ``text`` ends with a new line. Up to 15 digits are read exactly (Clinger 1990: a whole number
-    below 2**53 over a power of ten below 10**23 rounds once), more within an ulp.
+    -1 for what is not ``width`` numbers a line. Up to 15 digits are read exactly (Clinger 1990: a
+    whole number below 2**53 over a power of ten below 10**23 rounds once), more within an ulp.
     """
     powers = 10.0 ** np.arange(23)
-    values, width = rows.reshape(-1), rows.shape[1]
-    end, one = np.uint64(len(text)), np.uint64(1)  # unsigned: no test for indices below zero
-    place = np.uint64(0)
-    filled, row_end = 0, width
+    end, one = np.uint64(length), np.uint64(1)  # unsigned: no test for indices below zero
+    place, row_end = np.uint64(0), filled + width
     while place < end:
         c = np.int64(text[place])
         if c <= 32:
@@ -183,9 +164,11 @@ def _fill_rows(text: NDArray[np.uint8], rows: NDArray[np.float64]) -> int:
         if digits == 0 or digits > 18 or c > -16:  # nothing, more than an int64 holds, or a letter
             return -1
         value = float(mantissa) / powers[decimals]
+        if value > LARGEST_VALUE:
+            return -1
         values[filled] = -value if negative else value
         filled += 1
-    return int(filled // width)
+    return filled
 
 
 @cache
@@ -193,8 +176,8 @@ def _kernel() -> Any:
     """The parser, compiled on first use and kept on disk where that can be written."""
     import numba
 
-    signature = "int64(Array(uint8, 1, 'C', readonly=True), float64[:, ::1])"
+    signature = "int64(uint8[::1], int64, float64[::1], int64, int64)"
     try:
-        return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(_fill_rows)
+        return numba.njit(signature, cache=True, nogil=True, error_model="numpy")(_fill_values)
     except RuntimeError:  # numba: "no locator available"
-        return numba.njit(signature, nogil=True, error_model="numpy")(_fill_rows)
+        return numba.njit(signature, nogil=True, error_model="numpy")(_fill_values)
