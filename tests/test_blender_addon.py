@@ -28,7 +28,7 @@ from usdhand.reduce import ReducedRig
 
 ADD_ON = REPOSITORY / "docs" / "blender" / "usdhand_rig"
 SAMPLES = REPOSITORY / "samples"
-TOLERANCE_DEG = 0.05
+TOLERANCE_DEG = 0.002
 in_blender = pytest.mark.blender
 
 

@@ -169,8 +169,8 @@ def _drive_channel(armature: bpy.types.Object, channel: Channel) -> None:
     letters = [f"c{i}" for i in range(len(channel.controllers))]
     terms = [f"{slope:+.9g}*{c}" for slope, c in zip(channel.slopes, letters, strict=True)]
     expression = f"{channel.offset:.9g}" + "".join(terms)
-    driver = armature.driver_add(f'["{channel.name}"]').driver
-    _set_driver(driver, armature, expression, zip(letters, channel.controllers, strict=True))
+    curve = armature.driver_add(f'["{channel.name}"]')
+    _set_driver(curve, armature, expression, zip(letters, channel.controllers, strict=True))
 
 
 def _drive_bone(armature: bpy.types.Object, joint: Joint, helper: str | None) -> None:
@@ -184,16 +184,19 @@ def _drive_bone(armature: bpy.types.Object, joint: Joint, helper: str | None) ->
     bone.rotation_mode = "QUATERNION"
     components = rotations.expressions(before, after, joint.side, joint.is_ball)
     for i, expression in enumerate(components):
-        driver = bone.driver_add("rotation_quaternion", i).driver
-        _set_driver(driver, armature, expression, zip("aft", joint.channels, strict=True))
+        curve = bone.driver_add("rotation_quaternion", i)
+        _set_driver(curve, armature, expression, zip("aft", joint.channels, strict=True))
 
 
 def _set_driver(
-    driver: bpy.types.Driver,
+    curve: bpy.types.FCurve,
     armature: bpy.types.Object,
     expression: str,
     variables: Iterable[tuple[str, str]],
 ) -> None:
+    # Blender starts a driver with keys at 0 and 1, and snaps values to keys that are near.
+    curve.keyframe_points.clear()
+    driver = curve.driver
     for letter, channel in variables:
         variable = driver.variables.new()
         variable.name = letter
