@@ -202,6 +202,19 @@ def test_characters_without_motion_or_hands_are_shown_all_the_same(tmp_path: Pat
 
 
 @pytest.mark.real_data
+def test_digits_that_hang_off_nothing_have_curves(tmp_path: Path) -> None:
+    """Wrist and fingers of this hand are all roots."""
+    file = shared_data("gltf", "webxr-generic-hand", "left.glb")
+    run("preview", file, "-o", tmp_path / "hand.html")
+    [lane] = page_data(tmp_path / "hand.html")["lanes"]
+    assert len(lane["hands"]["left"]["channels"]) == 25
+    clip = api.read_character(file)
+    hands = api.find_hands(clip)
+    again = hands.decode(hands.encode(clip), clip)
+    assert rot.angle_between(again.rotations, clip.rotations).max() < 1e-6
+
+
+@pytest.mark.real_data
 def test_real_takes_have_bones_of_the_body_only(tmp_path: Path) -> None:
     take = sorted(shared_data("studiogalt", "full").glob("*.usdc"))[0]
     run("preview", take, "-o", tmp_path / "real.html")
@@ -321,8 +334,17 @@ def test_files_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
     edit(OK, other, lambda stage: stage)
     run("preview", OK, other, "-o", tmp_path / "two.html")
     names = [lane["name"] for lane in page_data(tmp_path / "two.html")["lanes"]]
-    assert len(set(names)) == 2
-    assert all(name.endswith("ok_01") for name in names)
+    assert names == ["gestures/ok_01", f"{tmp_path.name}/ok_01"]
+    assert str(tmp_path) not in (tmp_path / "two.html").read_text(encoding="utf-8")
+
+
+def test_many_files_are_not_all_shown_at_first(tmp_path: Path) -> None:
+    done = run("preview", *sorted(GESTURES.glob("ok_*.usdc")), "-o", tmp_path / "many.html",
+               "--max-points", "0")  # fmt: skip
+    assert "the first 6 of 8 lanes are shown" in done.output
+    data = page_data(tmp_path / "many.html")
+    assert [lane["shown"] for lane in data["lanes"]] == [True] * 6 + [False] * 2
+    assert data["title"] == "ok_01, ok_02 and 6 more"
 
 
 def test_json_tells_what_was_made(tmp_path: Path) -> None:

@@ -217,7 +217,7 @@ def test_play_and_pause_with_button_and_key(pages: Pages, folder: Path) -> None:
     page.page.locator("#view").focus()
     page.press("Space")
     page.page.wait_for_function(
-        f"() => Number(document.getElementById('scrub').value) > {stopped + 0.2}"
+        f"() => Math.abs(document.getElementById('scrub').value - {stopped}) > 0.2"
     )
     page.press("Space")
     assert play.text_content() == "Play"

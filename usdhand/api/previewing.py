@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from usdhand.anatomy import Conventions
+from usdhand.anatomy import Conventions, Side
 from usdhand.api.clips import find_hands
 from usdhand.errors import HandNotFoundError, UsageError
 from usdhand.formats.files import is_usd, read_any
@@ -15,6 +15,7 @@ from usdhand.formats.hashing import file_hash
 from usdhand.formats.output import check_output, written_beside
 from usdhand.formats.usd.takes import Take, read_takes
 from usdhand.motion import Clip
+from usdhand.motion.rotations import Array
 from usdhand.report.preview.events import read_report, report_rows, report_verb, retiming, warp_rows
 from usdhand.report.preview.lanes import Lane, lane_data, unshown
 from usdhand.report.preview.pack import Pack
@@ -23,6 +24,7 @@ from usdhand.report.preview.page import figure, page
 __all__ = ["PreviewSettings", "Previewed", "preview_clips", "write_preview"]
 
 PAGE_SUFFIXES = (".html", ".htm")
+MOST_SHOWN = 6  # lanes, when the page opens
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,7 @@ def preview_clips(
         raise UsageError("There is nothing to show: give a file.")
     settings = settings or PreviewSettings()
     read = [(Path(path), read_report(Path(path))) for path in reports]
+    rows = [{**row, "source": path.name} for path, r in read for row in report_rows(r, path)]
     pictures = [figure(Path(path)) for path in figures]
     names = _names([Path(f) for f in files])
     lanes = [
@@ -87,26 +90,19 @@ def preview_clips(
         for path, name in names.items()
         for lane in _lanes(path, name, skel, settings, conventions)
     ]
-    warps = dict(retiming(report) for _, report in read)
-    hashes = {path: file_hash(path) for path in names} if any(warps) else {}
-    lanes = [_retimed(lane, warps.get(hashes.get(_source(lane)) or "", {})) for lane in lanes]
-    rows = [
-        {**row, "source": str(path)} for path, report in read for row in report_rows(report, path)
-    ]
+    lanes = _retimed(lanes, dict(retiming(report) for _, report in read))
     if not any(report_verb(report) == "splice" for _, report in read):
-        warped = [lane for lane in lanes if lane.warps and lane.shown]
-        rows += [
-            {**row, "source": lane.name}
-            for lane in warped
-            for row in warp_rows(lane.warps, lane.clip.fps)
-        ]
+        rows += [row for lane in lanes if lane.shown for row in _warp_rows(lane)]
+    lanes, hidden = _few_shown(lanes)
     pack = Pack()
     made = [lane_data(lane, pack, settings.max_frames) for lane in lanes]
     words = tuple(word for _, word in made if word)
     notes = tuple(f"{lane.name}: {note}" for lane in lanes for note in lane.notes) + words
-    data = {"lanes": [d for d, _ in made], "rows": rows, "notes": [], **pack.document()}
-    text = page(title or ", ".join(names.values()), data, pictures)
-    return Previewed(text, tuple(lane.clip for lane in lanes), tuple(d for d, _ in made), notes)
+    data = {"lanes": [d for d, _ in made], "rows": rows, "notes": hidden, **pack.document()}
+    text = page(title or _title(list(names.values())), data, pictures)
+    return Previewed(
+        text, tuple(lane.clip for lane in lanes), tuple(d for d, _ in made), (*notes, *hidden)
+    )
 
 
 def write_preview(
@@ -136,11 +132,16 @@ def _lanes(
         takes = read_takes(path, skel, skins=settings.max_points > 0)
     else:
         takes = [Take(read_any(path, skel)[0])]
-    return [_lane(take, name, i == 0, settings, conventions) for i, take in enumerate(takes)]
+    return [_lane(take, path, name, i == 0, settings, conventions) for i, take in enumerate(takes)]
 
 
 def _lane(
-    take: Take, name: str, first: bool, settings: PreviewSettings, conventions: Conventions | None
+    take: Take,
+    path: Path,
+    name: str,
+    first: bool,
+    settings: PreviewSettings,
+    conventions: Conventions | None,
 ) -> Lane:
     notes = [*take.notes, *(str(p) for p in take.clip.problems if p.severity == "warning")]
     try:
@@ -148,7 +149,7 @@ def _lane(
         notes += hands.notes
     except HandNotFoundError as error:
         hands = None
-        notes.append(f"no close-ups and curves: {error}")
+        notes.append(f"no close-ups and curves: {str(error).removeprefix(f'{path}: ')}")
     skins = take.skins
     if word := unshown(skins, settings.max_points):
         skins = ()
@@ -166,15 +167,42 @@ def _lane(
     )
 
 
-def _retimed(lane: Lane, warps: Any) -> Lane:
-    return replace(lane, retime=warps) if warps else lane
+def _retimed(lanes: Sequence[Lane], warps: Mapping[str, Mapping[Side, Array]]) -> list[Lane]:
+    """Lanes of the hand clips that were spliced play in the time of the body."""
+    if not any(warps):
+        return list(lanes)
+    hashes = [file_hash(lane.clip.origin.path or Path()) or "" for lane in lanes]
+    return [replace(lane, retime=warps.get(h, {})) for lane, h in zip(lanes, hashes, strict=True)]
 
 
-def _source(lane: Lane) -> Path:
-    return lane.clip.origin.path or Path()
+def _warp_rows(lane: Lane) -> list[dict[str, Any]]:
+    return [{**row, "source": lane.name} for row in warp_rows(lane.warps, lane.clip.fps)]
+
+
+def _few_shown(lanes: Sequence[Lane]) -> tuple[list[Lane], list[str]]:
+    shown = [i for i, lane in enumerate(lanes) if lane.shown]
+    if len(shown) <= MOST_SHOWN:
+        return list(lanes), []
+    first = shown[:MOST_SHOWN]
+    word = f"the first {MOST_SHOWN} of {len(lanes)} lanes are shown; choose others on the page"
+    return [replace(lane, shown=i in first) for i, lane in enumerate(lanes)], [word]
+
+
+def _title(names: Sequence[str]) -> str:
+    if len(names) <= MOST_SHOWN:
+        return ", ".join(names)
+    return f"{', '.join(names[:2])} and {len(names) - 2} more"
 
 
 def _names(files: Sequence[Path]) -> dict[Path, str]:
-    """Names of lanes: the files' own, with their folders where they are the same."""
-    stems = [f.stem for f in files]
-    return {f: f.stem if stems.count(f.stem) == 1 else str(f.with_suffix("")) for f in files}
+    """Names of lanes: the files' own, with as many folders as tell them apart."""
+
+    def name(file: Path) -> str:
+        parts = file.absolute().with_suffix("").parts
+        for count in range(1, len(parts)):
+            own = parts[-count:]
+            if sum(f.absolute().with_suffix("").parts[-count:] == own for f in files) == 1:
+                return "/".join(own)
+        return file.name
+
+    return {file: name(file) for file in files}

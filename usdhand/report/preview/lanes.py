@@ -82,7 +82,7 @@ def lane_data(lane: Lane, pack: Pack, max_frames: int) -> tuple[dict[str, Any], 
         "view": _view(clip, lane.hands, drawn, positions),
         "hands": {},
         "meshes": [_mesh(skin, pack) for skin in lane.skins],
-        "retime": {side: warp.tolist() for side, warp in lane.retime.items()},
+        "retime": {side: warp.round(4).tolist() for side, warp in lane.retime.items()},
         "relations": {r.name: _relation(r) for r in lane.relations},
         "notes": [*lane.notes, *([word] if word else [])],
     }

@@ -122,14 +122,7 @@ export class Character {
     this.surfaces = [];
     this.meshJoints = this.world.map(() => new THREE.Bone());
     for (const mesh of this.lane.meshes) {
-      const geometry = new THREE.BufferGeometry();
-      const attribute = (table, normalized) =>
-        new THREE.BufferAttribute(table.values, table.columns, normalized);
-      geometry.setAttribute('position', attribute(tables[mesh.points]));
-      geometry.setAttribute('skinIndex', attribute(tables[mesh.joints]));
-      geometry.setAttribute('skinWeight', attribute(tables[mesh.weights], true));
-      geometry.setIndex(new THREE.BufferAttribute(tables[mesh.triangles].values, 1));
-      geometry.computeVertexNormals();
+      const geometry = shared(mesh, tables);
       const own = new THREE.Color(...mesh.colour);
       const material = new THREE.MeshLambertMaterial({ color: own, side: THREE.DoubleSide });
       // Where a mesh is see-through, only what is nearest to the camera is drawn.
@@ -157,6 +150,24 @@ export class Character {
     this.ground.position.set(centre[0], floor, centre[2]);
     this.scene.add(this.ground);
   }
+}
+
+const geometries = new Map();
+
+/** Points and faces of a mesh: one for all lanes that have the same. */
+function shared(mesh, tables) {
+  const key = [mesh.points, mesh.joints, mesh.weights, mesh.triangles].join();
+  if (geometries.has(key)) return geometries.get(key);
+  const geometry = new THREE.BufferGeometry();
+  const attribute = (table, normalized) =>
+    new THREE.BufferAttribute(table.values, table.columns, normalized);
+  geometry.setAttribute('position', attribute(tables[mesh.points]));
+  geometry.setAttribute('skinIndex', attribute(tables[mesh.joints]));
+  geometry.setAttribute('skinWeight', attribute(tables[mesh.weights], true));
+  geometry.setIndex(new THREE.BufferAttribute(tables[mesh.triangles].values, 1));
+  geometry.computeVertexNormals();
+  geometries.set(key, geometry);
+  return geometry;
 }
 
 function skinned(geometry, material, skeleton) {

@@ -6,7 +6,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'orbit';
 
 const FIELD_OF_VIEW = 32;
-const FIRST_VIEW = { body: [0.5, 0.25, 2.4], left: [0.5, 0.5, 2.0], right: [-0.5, 0.5, 2.0] };
+const FIRST_VIEW = { body: [0.45, 0.22, 2.15], left: [0.5, 0.5, 2.0], right: [-0.5, 0.5, 2.0] };
 export const CAMERAS = ['body', 'left', 'right'];
 
 export class Stage {
