@@ -238,6 +238,9 @@ def _foreign(clip: Clip, frames: HandFrames) -> dict[int, Array]:
     found = {}
     for i in np.flatnonzero(parents != frames.references):
         pair = [int(parents[i]), int(frames.references[i])]
+        if pair[0] < 0:  # the digit hangs off nothing: its parent is the world
+            found[int(i)] = forward_kinematics(clip, pair[1:]).rotations[:, 0].T
+            continue
         base = clip.skeleton.common_ancestor(pair)
         parent, reference = np.moveaxis(forward_kinematics(clip, pair, base).rotations, 1, 0)
         found[int(i)] = rot.multiply(rot.conjugate(parent), reference).T
