@@ -1,4 +1,6 @@
-"""Runs inside Blender's Python: import a glTF file, write what Blender made of it to an .npz.
+"""Runs inside Blender's Python: import a glTF file, write what Blender made of it.
+
+To an .npz, and with Blender's own exporter to a .glb beside it.
 
 usage: python blender_gltf.py FILE.glb OUT.npz FPS FRAME...
 """
@@ -28,6 +30,7 @@ def main(source: str, target: str, fps: int, frames: list[float]) -> None:
         posed=np.array(posed),
         empties=np.array([o.name for o in bpy.data.objects if o.type == "EMPTY"]),
     )
+    bpy.ops.export_scene.gltf(filepath=target.replace(".npz", ".glb"))
 
 
 if __name__ == "__main__":
