@@ -142,10 +142,32 @@ def test_hands_that_do_not_move() -> None:
         splice_hands(body, short)
 
 
+def test_a_clip_that_shows_a_part_is_refused_with_the_pins_that_place_it(
+    run: Run, tmp_path: Path
+) -> None:
+    out = tmp_path / "talk.usda"
+    message = str(run(BODY, HANDS, "-o", out, code=2).exception)
+    assert "beyond the band" in message
+    pins = message.rpartition("give ")[2].split()
+    run(BODY, HANDS, *pins, "-o", out)
+    clip, true = read_clip(out), read_clip(FULL)
+    ours, theirs = (find_hands(c).encode(c) for c in (clip, true))
+    difference = (ours.values - theirs.select(ours.names).values)[1:179]
+    assert np.sqrt(np.mean(difference**2)) < 2.0
+    with pytest.raises(UsageError, match=r"After the pin 1:1 the body lasts.*--pin 7:1:18"):
+        splice_hands(read_clip(BODY), read_clip(HANDS), pins=["1:1"])
+    other = SAMPLES / "conversations" / "talk_02_body.usdc"
+    notes = splice_hands(read_clip(other), read_clip(HANDS)).notes
+    assert any("Nothing in the longer clip is like the shorter" in note for note in notes)
+    with pytest.raises(UsageError, match=r"The body is like the hand clip from 0\.. s"):
+        splice_hands(read_clip(HANDS), read_clip(FULL))
+
+
 def test_long_differences_are_worth_a_warning() -> None:
     body, hands = read_clip(BODY), read_clip(HANDS)
-    result = splice_hands(body, hands, pins=["1:1", "181:403"])
-    assert any("factor of 2" in note for note in result.notes)
+    result = splice_hands(body, hands, pins=["1:1", "451:403"])
+    assert any("Between the pins 1:1 and 451:403" in note for note in result.notes)
+    assert not splice_hands(body, hands, pins=["1:1", "181:403"]).notes
     with pytest.raises(UsageError, match="not spliced"):
         splice_hands(body, read_clip(RIGHT), pins=["left:1:1"])
     with pytest.raises(UsageError, match="trunk"):

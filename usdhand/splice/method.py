@@ -30,8 +30,9 @@ from usdhand.splice.warps import through_pins
 
 Wrist = Literal["body", "hands"]
 
-# A hand whose wrist stays within this of its mean, in lengths of the palm, does not move.
-STILL = 0.1
+# A hand whose wrist stays within this of its mean, in lengths of the palm, does not move; and one
+# that goes less than this share as far as the other one tells less about timing than that.
+STILL, LEAST_SHARE = 0.1, 0.1
 # The band of pass 2 is not wider, in seconds, however long the clips.
 MOST_BAND_S = 10.0
 # Rounds of matching signs with the hand clip in the body's time.
@@ -227,17 +228,23 @@ def _aligned_hands(
     settings: SpliceSettings,
     pins: Mapping[Side, tuple[Pin, ...]],
 ) -> tuple[dict[Side, Alignment], list[str]]:
-    """Alignments of the hands that move; hands that do not follow the other one."""
+    """Alignments of the hands that move; hands that hardly do follow the other one."""
     times = np.arange(len(body)) / body.fps
-    found: dict[Side, Alignment] = {}
-    still: list[Side] = []
-    for side, own in pins.items():
-        ours = hand_markers(body, body_hands, side, settings.fps)
-        theirs = hand_markers(hand_clip, hand_hands, side, settings.fps)
-        if any(is_still(m, settings.smoothing) for m in (ours, theirs)):
-            still.append(side)
-        else:
-            found[side] = _aligned(ours, theirs, settings, own, times)
+    markers = {
+        side: (
+            hand_markers(body, body_hands, side, settings.fps),
+            hand_markers(hand_clip, hand_hands, side, settings.fps),
+        )
+        for side in pins
+    }
+    reach = {s: min(_reach(m, settings.smoothing) for m in both) for s, both in markers.items()}
+    enough = max(STILL, LEAST_SHARE * max(reach.values()))
+    still = [side for side in pins if reach[side] < enough]
+    found = {
+        side: _aligned(*markers[side], settings, own, times)
+        for side, own in pins.items()
+        if side not in still
+    }
     if not found:
         raise InputError(
             f"No hand moves in both {body.name} and {hand_clip.name}, so nothing tells which "
@@ -247,7 +254,7 @@ def _aligned_hands(
     for side in still:
         [(moving, alignment)] = found.items()
         found[side] = _following(alignment, moving, pins[side], times)
-        notes.append(f"the {side} hand does not move: it follows the {moving} one")
+        notes.append(f"the {side} hand hardly moves: it follows the {moving} one")
     return {side: found[side] for side in pins}, notes
 
 
@@ -268,12 +275,11 @@ def _aligned(
     )
 
 
-def is_still(markers: Markers, smoothing: float) -> bool:
-    """Whether a wrist stays where it is."""
+def _reach(markers: Markers, smoothing: float) -> float:
+    """How far a wrist goes from its mean, in lengths of the palm."""
     wrist = smoothed(markers.wrist, smoothing * markers.fps)
-    return bool(
-        np.linalg.norm(wrist - wrist.mean(axis=0), axis=-1).max() < STILL * markers.palm_length
-    )
+    far = np.linalg.norm(wrist - wrist.mean(axis=0), axis=-1).max()
+    return float(far / max(markers.palm_length, 1e-9))
 
 
 def _following(alignment: Alignment, side: Side, pins: tuple[Pin, ...], times: Array) -> Alignment:
