@@ -76,7 +76,7 @@ def guess_up(poses: Iterable[Array]) -> tuple[str, Problem]:
             _, y, z = np.maximum(np.median(np.ptp(positions, axis=1), axis=0), 1e-9)
             said += float(np.clip(np.log(z / y), -2.0, 2.0))
     up = "Z" if said > np.log(CLEARLY_LONGER) else "Y"
-    message = f"the file does not say which axis is up: read as {up} up; --up says otherwise"
+    message = f"the file does not say which axis is up: read as {up} up; --input-up says otherwise"
     return up, Problem("guessed-up-axis", message, severity="note")
 
 
