@@ -260,8 +260,9 @@ def test_nulls_between_joints_are_joints(tmp_path: Path) -> None:
 
 
 def test_a_skeleton_of_nulls(tmp_path: Path) -> None:
-    clip = read.read_clip(write_fbx(tmp_path / "a.fbx", chain(kind="Null")))
-    assert clip.skeleton.joints == ("Hips", "Hips/Spine", "Hips/Spine/Head")
+    nodes = [*chain(kind="Null"), Node("End", 2, "Null"), Node("Lamp target", -1, "Null")]
+    clip = read.read_clip(write_fbx(tmp_path / "a.fbx", nodes))
+    assert clip.skeleton.joints == ("Hips", "Hips/Spine", "Hips/Spine/Head", "Hips/Spine/Head/End")
     assert [p.severity for p in clip.problems if p.code == "no-limbs"] == ["note"]
 
 

@@ -107,12 +107,16 @@ def unique(names: Iterable[str]) -> list[str]:
 
 
 def _joint_nodes(scene: Scene, moved: frozenset[int]) -> tuple[frozenset[int], tuple[Problem, ...]]:
-    """Limbs, bones of skins and what lies between; without any, all nulls that move."""
+    """Limbs, bones of skins and what lies between; without any, nulls that move and those below."""
     bones = {i for i, kind in enumerate(scene.kinds) if kind == "BONE"} | scene.skinned
     problems: tuple[Problem, ...] = ()
     if not bones:
         nulls = {i for i, k in enumerate(scene.kinds) if k in ("EMPTY", "UNKNOWN") and i}
-        bones = nulls & moved or nulls
+        carried = set(moved)
+        for node in sorted(nulls):  # parents come first
+            if int(scene.parents[node]) in carried:
+                carried.add(node)
+        bones = nulls & carried or nulls
         message = "the file has no limb nodes: its null objects are read as joints"
         problems = (Problem("no-limbs", message, severity="note"),)
     bones.discard(0)
