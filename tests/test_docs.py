@@ -15,7 +15,7 @@ from usdhand.cli import main
 from usdhand.cli.main import VERBS
 
 REFERENCE = (REPOSITORY / "docs" / "command-line.md").read_text(encoding="utf-8")
-PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 
 
 def commands() -> list[tuple[str, click.Command]]:
