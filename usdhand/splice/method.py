@@ -177,7 +177,7 @@ def align(
     body: Markers, hand: Markers, settings: SpliceSettings, pins: Sequence[Pin], times: Array
 ) -> tuple[Array, Array, int]:
     """Seconds of the hand clip (times,) after pass 2 and after pass 1, and the cost of pass 1."""
-    band = _band(len(body), len(hand), settings, pins)
+    band = first_band(len(body), len(hand), settings, pins)
     signs = settings.smoothing, settings.dead_zone
     path = phase_path(body, hand, band, *signs, settings.align, settings.directions)
     reach = min(settings.band[1] * len(body), MOST_BAND_S * settings.fps)
@@ -215,7 +215,8 @@ def _room(times: Array, pins: Sequence[Pin]) -> Array:
     return room
 
 
-def _band(rows: int, columns: int, settings: SpliceSettings, pins: Sequence[Pin]) -> Band:
+def first_band(rows: int, columns: int, settings: SpliceSettings, pins: Sequence[Pin]) -> Band:
+    """Where the path of pass 1 may go."""
     width = max(settings.band[0] * rows, settings.least_band * settings.fps)
     return pinned_band(anchors_of(pins, rows, columns, settings.fps), width)
 
