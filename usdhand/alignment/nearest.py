@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from usdhand.alignment.index import CELL_EDGES, SearchIndex, in_chunks
+from usdhand.alignment.index import CELL_EDGES, CODES, SearchIndex, in_chunks
 from usdhand.alignment.query import PART_EDGES, STAGES, Query, prepare_query
 from usdhand.alignment.refine import nearest, ranked
 from usdhand.alignment.segments import PackedSegments
@@ -99,7 +99,7 @@ def search(
                     found, cost = nearest(index, query, own, excluded[number], k)
                 else:
                     tried = np.flatnonzero(own[0, : query.last - query.first] < np.inf)
-                    found, cost = ranked(index, query, tried, own[0, tried], k)
+                    found, cost = ranked(index, query, tried, own[0, tried], k, query.error)
                 ids[number, : len(found)] = found
                 costs[number, : len(cost)] = cost
 
@@ -188,22 +188,30 @@ def _fill_costs(
 ) -> None:
     """Accumulated costs (queries, candidates of a query), infinite for the hopeless."""
     from usdhand.alignment.scan import scan
+    from usdhand.alignment.tiles import NEVER
 
-    frames = np.concatenate([query.frames for query in batch])
+    step = index.code_step.astype(np.float32)
+    middle = CODES / 2 * index.code_step
+    frames = np.concatenate([query.frames - middle for query in batch])
+    squares = np.sum(frames**2, axis=1).astype(np.float32)
+    frames = frames.astype(np.float32)
     parts = np.cumsum([0] + [len(query) for query in batch])
     ranges = np.array([(query.first, query.last) for query in batch])
     slacks = np.array([query.slack for query in batch])
     margins = np.array([query.margin for query in batch])
-    step = index.code_step.astype(np.float32)
+    errors = np.array([query.error for query in batch])
     costs[:] = np.inf
+    worst = np.full(len(batch), NEVER)
 
     def fill(start: int, stop: int) -> None:
         scan(
             frames,
+            squares,
             parts,
             ranges,
             slacks,
             margins,
+            errors,
             excluded,
             k,
             index.codes,
@@ -213,6 +221,7 @@ def _fill_costs(
             index.groups,
             start,
             stop,
+            worst,
             costs,
         )
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from usdhand.alignment.index import CELL_EDGES, SearchIndex
+from usdhand.alignment.index import CELL_EDGES, CODES, SearchIndex
 from usdhand.alignment.warping import can_warp
 
 _MIDDLE = (CELL_EDGES[4:12] + CELL_EDGES[5:13]) / 2
@@ -35,6 +35,7 @@ class Query:
     first, last : range of the candidates of a length that may be warped
     slack : factor that float32 sums of the same cost cannot differ by
     margin : how far the root of an accumulated cost of codes can be off, twice
+    error : how far a float32 cost can be off that is made of products, see `scan`
     """
 
     exact: NDArray[np.float32]
@@ -46,17 +47,20 @@ class Query:
     last: int
     slack: float
     margin: float
+    error: float
 
     def __len__(self) -> int:
         return len(self.exact)
 
-    def limit(self, worst: float) -> float:
+    def limit(self, worst: float, error: float = 0.0) -> float:
         """Largest approximate cost of a candidate that can in truth be as near as ``worst``.
 
         The root of an accumulated cost is a norm, so codes that are off by a bounded distance
         move it by no more than that: up for the one that is to be beaten, down for another.
+        ``error`` is what both costs can be off by besides.
         """
-        return float((np.sqrt(worst * self.slack) + self.margin) ** 2 * self.slack + _TINY)
+        root = np.sqrt(max(worst + error, 0.0) * self.slack) + self.margin
+        return float(root**2 * self.slack + error + _TINY)
 
 
 def prepare_query(index: SearchIndex, exact: NDArray[np.float32], max_ratio: float) -> Query:
@@ -73,6 +77,8 @@ def prepare_query(index: SearchIndex, exact: NDArray[np.float32], max_ratio: flo
             means[part] = exact[start:stop].mean(axis=0, dtype=np.float64)
     means = (means - index.box_origin) / index.box_unit
     first, last = _candidates(n, index.lengths, max_ratio)
+    reach = CODES / 2 * index.code_step
+    largest = float(np.sum((frames - reach) ** 2, axis=1, dtype=np.float64).max())
     return Query(
         exact,
         frames,
@@ -84,6 +90,8 @@ def prepare_query(index: SearchIndex, exact: NDArray[np.float32], max_ratio: flo
         # a sum of s squares of differences, none negative, is off by at most s + 4 roundings
         1 + 4 * (n + width + means.size + 8) * 2.0**-24,
         2 * float(np.sqrt(n * np.sum((_CODE_ERROR * index.code_step) ** 2))),
+        # a sum of D products and two squares is off by some roundings of what they amount to
+        n * 2 * (frames.shape[1] + 8) * 2.0**-24 * (largest + float(np.sum(reach**2))),
     )
 
 

@@ -79,6 +79,7 @@ def ranked(
     tried: NDArray[np.int64],
     approximate: NDArray[np.float32],
     k: int,
+    error: float = 0.0,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """The best k of the candidates that were tried, by costs in float64.
 
@@ -86,6 +87,7 @@ def ranked(
     ----------
     tried : counted from the first candidate of the query
     approximate : their accumulated costs of coded features
+    error : what these can be off by besides what codes lose
 
     Returns
     -------
@@ -93,7 +95,7 @@ def ranked(
     """
     from usdhand.alignment.tiles import warp_moves
 
-    near = approximate <= query.limit(kth_smallest(approximate, k))
+    near = approximate <= query.limit(kth_smallest(approximate, k), error)
     positions = query.first + tried[near]
     costs = np.empty(len(positions))
     for number, position in enumerate(positions):

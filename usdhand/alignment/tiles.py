@@ -17,7 +17,7 @@ from usdhand.alignment.index import UNROLL
 
 LANES = 16
 NEVER = np.float32(1e30)  # the cost of a cell that no path reaches
-_FAR = np.float32(1e12)  # a feature after the end of a lane: never part of the best path
+FAR = np.float32(1e12)  # a feature after the end of a lane: never part of the best path
 _U = np.uint64
 
 
@@ -114,7 +114,7 @@ def fill_tile(
                         tile[f, at] = np.float32(codes[frame, f]) * step[f]
                         tile[g, at] = np.float32(codes[frame, g]) * step[g]
                     else:
-                        tile[d, at] = tile[e, at] = tile[f, at] = tile[g, at] = _FAR
+                        tile[d, at] = tile[e, at] = tile[f, at] = tile[g, at] = FAR
 
 
 @kernel
