@@ -130,7 +130,8 @@ def _meant(scene: Scene, cm_per_unit: float | None, up: str | None) -> Scene:
     axes = scene.axes
     if up is not None:
         axes = Y_UP_FROM_Z_UP if up == "Z" else np.eye(3)
-    return right_handed(replace(scene, cm_per_unit=unit), axes)
+    says_axes = scene.says_axes or up is not None
+    return right_handed(replace(scene, cm_per_unit=unit, says_axes=says_axes), axes)
 
 
 def _skeleton(scene: Scene, rig: Rig) -> Skeleton:
