@@ -5,15 +5,18 @@ from __future__ import annotations
 import itertools
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from cli_runner import run
 from conftest import REPOSITORY, shared_data
-from pxr import Usd, UsdSkel
+from pxr import Sdf, Usd, UsdSkel
 
 from usdhand import api
+from usdhand.anatomy import SIDES
 from usdhand.api import filling
 from usdhand.errors import InputError, UsageError
 from usdhand.fill import PAPER, FillSettings, MotionLibrary
@@ -404,3 +407,148 @@ def test_held_out_real_takes() -> None:
         print(side, ours, error(PAPER, "fill", side), error(FillSettings(), "mean pose", side))
         assert ours < 0.9 * error(PAPER, "fill", side)
         assert ours < error(FillSettings(), "mean pose", side)
+
+
+def test_a_body_that_starts_late_is_filled_in_its_own_time(
+    library_file: Path, tmp_path: Path
+) -> None:
+    """Time codes from 1001 on, as shots have them."""
+    shifted, out = tmp_path / "late.usda", tmp_path / "out.usda"
+    layer = Sdf.Layer.CreateNew(str(shifted))
+    source = Usd.Stage.Open(str(BODY))
+    layer.subLayerPaths.append(str(BODY))
+    layer.subLayerOffsets[0] = Sdf.LayerOffset(1000.0)
+    layer.timeCodesPerSecond = layer.framesPerSecond = source.GetTimeCodesPerSecond()
+    layer.startTimeCode = source.GetStartTimeCode() + 1000
+    layer.endTimeCode = source.GetEndTimeCode() + 1000
+    layer.defaultPrim = source.GetRootLayer().defaultPrim
+    layer.pseudoRoot.SetInfo("upAxis", "Y")
+    layer.pseudoRoot.SetInfo("metersPerUnit", 0.01)
+    layer.Save()
+    arguments = ("--library", library_file, "--side", "left", "--json")
+    late = json.loads(run("fill", shifted, "-o", out, *arguments).stdout)
+    usual = json.loads(run("fill", BODY, "-o", tmp_path / "usual.usda", *arguments).stdout)
+    assert late["hands"] == usual["hands"]  # seconds from the first frame
+    one, other = api.read_clip(out), api.read_clip(tmp_path / "usual.usda")
+    assert one.time_codes[0] == 1001.0
+    assert one.time_codes[-1] == other.time_codes[-1] + 1000
+    assert np.array_equal(one.rotations, other.rotations)
+
+
+def test_threads_make_no_difference(body: Clip, library: MotionLibrary) -> None:
+    """Nor do shards of the library, merged by (cost, id)."""
+    from usdhand.alignment import PackedSegments, merge, pack, prepare, search
+    from usdhand.fill import candidates, space_for
+
+    clip = part_of(body, slice(0, 240))
+    results = []
+    for threads in (1, 2, 2):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(candidates, "search", partial(search, threads=threads))
+            results.append(filling.fill_fingers(clip, library).clips[0].rotations)
+    assert all(np.array_equal(results[0], other) for other in results[1:])
+
+    def in_shards(_: object, asked: PackedSegments, k: int, **more: Any) -> Any:
+        space = space_for(library, (current[0],), FillSettings())
+        whole = space.packed
+        parts = []
+        for chosen in (range(0, len(whole), 2), range(1, len(whole), 2)):
+            rows = list(chosen)
+            shard = pack([whole[i] for i in rows], whole.ids[rows], whole.groups[rows])
+            parts.append(search(prepare(shard), asked, k=k, **more))
+        return merge(*parts, k)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(candidates, "search", in_shards)
+        for side in SIDES:
+            current = [side]
+            one = filling.fill_fingers(clip, library, sides=(side,)).clips[0].rotations
+            joints = api.find_hands(clip).frames[side].joints
+            assert np.array_equal(one[:, joints], results[0][:, joints])
+
+
+def test_people_of_other_build_gesture_alike(library: MotionLibrary) -> None:
+    """Ben's arms, by another rig in other units and axes, lie near those of ada's same gestures."""
+    from usdhand.fill import space_for
+    from usdhand.fill.candidates import find_candidates, part_rows, part_segments
+
+    ben = filling.build_library(
+        sorted((SAMPLES / "gestures_ben").glob("*.usdc")), Path("ben.usdc").absolute()
+    ).library
+    space = space_for(library, ("right",), FillSettings())
+    alike: list[bool] = []
+    for clip in ben.clips:
+        if "right" not in clip.hands:
+            continue
+        arms = [clip.hands["right"].arm]
+        rows = part_rows(arms, space.metric)
+        queries = [rows[a : b + 1] for a, b in part_segments(arms, space.segmentation)]
+        for found in find_candidates(queries, space, 5):
+            alike += [library.clips[space.clips[c.segment]].label == clip.label for c in found]
+    assert np.mean(alike) > 0.4  # 0.125 by chance; rest poses are the same for all gestures
+
+
+def test_the_truth_in_the_library_comes_back(
+    library: MotionLibrary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the guard, a take that is in the library is its own nearest, neither late nor early.
+
+    What is left is what joining and smoothing change.
+    """
+    from usdhand.fill import method
+
+    monkeypatch.setattr(method, "same_motion", lambda *_: [])
+    clip = api.read_clip(SAMPLES / "gestures" / "wipe_01.usdc")
+    filled = filling.fill_fingers(clip, library, FillSettings(k=1, pool=0), replace_motion=True)
+    used = {
+        library.clips[p.space.clips[c.candidates[c.chosen].segment]].name
+        for p in filled.parts
+        for c in p.alternatives[0].choices
+    }
+    assert used == {"wipe_01"}
+    hands = api.find_hands(clip)
+    truth, found = hands.encode(clip).values, hands.encode(filled.clips[0]).values
+    assert np.sqrt(np.mean((truth - found) ** 2)) < 0.3
+
+
+def test_evaluate_has_the_known_answer(tmp_path: Path) -> None:
+    """Two gestures, each twice: the other take of a gesture is the nearest, and fills it exactly.
+
+    The second take is the first under another name and hash.
+    """
+    from usdhand.fill import method
+
+    library = tmp_path / "l.usdc"
+    clips = [SAMPLES / "gestures" / f"{name}_01.usdc" for name in ("ok", "wipe")]
+    run("library", "build", *clips, "-o", library, "-q")
+    motions = filling.read_library(library)
+    twins = tuple(
+        replace(c, name=c.name.replace("_01", "_02"), content_hash="") for c in motions.clips
+    )
+    filling.write_library(replace(motions, clips=(*motions.clips, *twins)), library, force=True)
+    broken = tmp_path / "broken.usda"
+    broken.write_text("#usda 1.0\n")
+    with pytest.MonkeyPatch.context() as patch:
+        # by content only, else the twins would be left out as well
+        patch.setattr(
+            method,
+            "same_motion",
+            lambda library, _, content: [
+                i for i, c in enumerate(library.clips) if c.content_hash == content
+            ],
+        )
+        result = run(
+            "evaluate", library, "--k", 1, "--takes", clips[0], "--takes", broken, "--json"
+        )
+    data = json.loads(result.stdout)
+    assert [left["path"] for left in data["left_out"]] == [str(broken)]
+    labels = data["label_agreement"]
+    assert labels["labels"] == ["ok", "wipe"]
+    assert all(m["share"] == 1.0 for m in labels["metrics"])
+    assert labels["confusion"] == [[1.0, 0.0], [0.0, 1.0]]
+    for methods in data["reconstruction"].values():
+        assert methods["fill"]["degrees"] < 0.5
+        assert methods["best candidate"]["degrees"] < 0.2
+        assert methods["fill"]["fingertip_mm"] < 1.0
+        assert methods["rest pose"]["degrees"] > 5
+    assert data["settings"]["fill"]["k"] == 1

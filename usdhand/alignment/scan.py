@@ -120,7 +120,7 @@ def scan(
 def fill_products(
     codes: Codes, step: Floats, begins: Ints, lengths: Ints, stop: int, tile: Floats
 ) -> None:
-    """Like `fill_tile`: frames from the middle of the codes times -2, then their squared lengths."""
+    """Like `fill_tile`: -2 times the frames from the middle of the codes, and their squares."""
     width = codes.shape[1]
     for j in range(stop):
         for lane in range(LANES):
@@ -188,7 +188,7 @@ def within(state: Floats, row: int, first: int, last: int, limit: float) -> tupl
 
     The first is behind the last where there is none.
     """
-    arrived = _U(1 + 2 * (row % 2))
+    arrived = 1 + 2 * (row % 2)
     while first <= last and lowest_lane(state, arrived, first) > limit:
         first += 1
     while last > first and lowest_lane(state, arrived, last) > limit:
@@ -199,10 +199,10 @@ def within(state: Floats, row: int, first: int, last: int, limit: float) -> tupl
 @kernel
 def lowest_lane(state: Floats, arrived: int, frame: int) -> float:
     """Least cost of the lanes at a candidate frame."""
-    base = _U((frame + 2) * LANES)
-    low = state[arrived, base]
+    row, base = _U(arrived), _U((frame + 2) * LANES)
+    low: float = state[row, base]
     for lane in range(_U(LANES)):
-        low = min(low, state[arrived, base + lane])
+        low = min(low, state[row, base + lane])
     return low
 
 
