@@ -85,7 +85,10 @@ export class Character {
     const bones = this.lane.bones;
     const stick = new THREE.CylinderGeometry(THIN, 1, 1, 12, 1, true).translate(0, 0.5, 0);
     const knob = new THREE.SphereGeometry(1, 12, 8);
-    const starts = new Set(bones.map(({ joint }) => joint));
+    const starts = new Map();
+    for (const { joint, radius } of bones) {
+      starts.set(joint, Math.max(starts.get(joint) ?? 0, radius));
+    }
     const turn = ({ to }) =>
       new THREE.Quaternion().setFromUnitVectors(UP, new THREE.Vector3(...to).normalize());
     const shape = (bone, at, [x, y, z]) =>
@@ -94,9 +97,10 @@ export class Character {
       ({ joint: bone.joint, part: bone.part, shape: shape(bone, at, [r, r, r]) });
     this.shapes = bones.map((bone) =>
       shape(bone, [0, 0, 0], [bone.radius, Math.hypot(...bone.to), bone.radius]));
-    // A ball where a bone begins, and one where it ends if no other begins there.
+    // A ball where a bone begins, and one where it ends if no larger one begins there.
     this.balls = bones.flatMap((bone) => {
-      const ends = bone.child === bone.joint || !starts.has(bone.child);
+      const next = bone.child === bone.joint ? 0 : (starts.get(bone.child) ?? 0);
+      const ends = next < THIN * bone.radius;
       const start = ball(bone, [0, 0, 0], bone.radius);
       return ends ? [start, ball(bone, bone.to, THIN * bone.radius)] : [start];
     });

@@ -45,7 +45,8 @@ export class Playback {
   /** Goes on by the time that has passed since the last call; `now` in milliseconds. */
   tick(now) {
     if (!this.playing) return;
-    const passed = this.last === null ? 0 : (now - this.last) / 1000;
+    // A page that was hidden for a while goes on where it was.
+    const passed = this.last === null ? 0 : Math.min((now - this.last) / 1000, 1);
     this.last = now;
     const time = this.time + passed * this.speed;
     if (time < this.duration) return this.seek(time);

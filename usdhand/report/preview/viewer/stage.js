@@ -7,7 +7,6 @@ import { OrbitControls } from 'orbit';
 
 const FIELD_OF_VIEW = 32;
 const FIRST_VIEW = { body: [0.45, 0.22, 2.15], left: [0.5, 0.5, 2.0], right: [-0.5, 0.5, 2.0] };
-export const CAMERAS = ['body', 'left', 'right'];
 
 export class Stage {
   constructor(canvas, characters, changed) {
@@ -35,11 +34,12 @@ export class Stage {
 
   /** Looks at "body", "left" or "right"; every one of them keeps its own orbit. */
   setCamera(mode) {
-    this.views[this.mode] = [this.orbitCamera.position.clone(), this.orbit.target.clone()];
-    this.mode = mode;
-    if (!this.views[mode]) return this.resetView();
-    const [position, target] = this.views[mode];
-    this.#moveOrbit(position, target);
+    this.#look(mode, this.turning);
+  }
+
+  /** Close-up cameras turn with the wrist: the hand stands still, its fingers move. */
+  setTurning(on) {
+    this.#look(this.mode, on);
   }
 
   resetView() {
@@ -47,17 +47,20 @@ export class Stage {
     this.#moveOrbit(new THREE.Vector3(...start), new THREE.Vector3());
   }
 
+  #look(mode, turning) {
+    const name = () => (this.turning && this.mode !== 'body' ? `${this.mode} turning` : this.mode);
+    this.views[name()] = [this.orbitCamera.position.clone(), this.orbit.target.clone()];
+    this.mode = mode;
+    this.turning = turning;
+    const view = this.views[name()];
+    if (view) this.#moveOrbit(...view);
+    else this.resetView();
+  }
+
   #moveOrbit(position, target) {
     this.orbitCamera.position.copy(position);
     this.orbit.target.copy(target);
     this.orbit.update();
-    this.changed();
-  }
-
-  /** Close-up cameras turn with the wrist: the hand stands still, its fingers move. */
-  setTurning(on) {
-    this.turning = on;
-    if (this.mode !== 'body') this.resetView();
     this.changed();
   }
 
@@ -138,27 +141,36 @@ export class Stage {
     camera.updateProjectionMatrix();
   }
 
-  #lookAt({ lane, world }) {
+  /** What a lane's camera looks at, its size, and how the orbit is turned around it. */
+  #lookAt(character) {
+    const first = this.overlay ? this.characters[this.places()[0].lane] : character;
+    const { lane, world } = character;
+    const up = new THREE.Vector3(0, 1, 0);
+    const turn = new THREE.Quaternion().setFromAxisAngle(up, first.lane.view.yaw);
     const hand = lane.hands[this.mode];
-    const first = this.characters[this.overlay ? this.places()[0].lane : 0].lane.view;
-    const facing = this.overlay ? first.yaw : lane.view.yaw;
-    const turn = new THREE.Quaternion().setFromAxisAngle(new THREE.Vector3(0, 1, 0), facing);
     if (!hand) {
-      const view = this.overlay ? first : lane.view;
-      const target = new THREE.Vector3(...view.centre);
+      const { centre, size } = first.lane.view;
+      const target = new THREE.Vector3(...centre);
       if (lane.view.follow !== null) {
         const joint = new THREE.Vector3().setFromMatrixPosition(world[lane.view.follow]);
         target.set(joint.x, target.y, joint.z);
       }
-      return { target, size: view.size, turn };
+      return { target, size, turn };
     }
-    const wrist = new THREE.Matrix4().copy(world[hand.wrist]);
-    const palm = new THREE.Quaternion().setFromRotationMatrix(wrist);
-    palm.multiply(new THREE.Quaternion(...hand.palm));
-    const along = new THREE.Vector3(0, 0, 0.45 * hand.size).applyQuaternion(palm);
-    const target = new THREE.Vector3().setFromMatrixPosition(wrist).add(along);
+    // Over each other, all look as far ahead of the wrist as the first: wrists are in one place.
+    const palm = palmOf(character, hand);
+    const firstHand = first.lane.hands[this.mode];
+    const ahead = firstHand && !this.turning ? palmOf(first, firstHand) : palm;
+    const target = new THREE.Vector3(0, 0, 0.45 * hand.size).applyQuaternion(ahead);
+    target.add(new THREE.Vector3().setFromMatrixPosition(world[hand.wrist]));
     return { target, size: hand.size, turn: this.turning ? palm.multiply(FINGERS_UP) : turn };
   }
+}
+
+/** How a palm is turned in the world. */
+function palmOf({ world }, hand) {
+  const wrist = new THREE.Quaternion().setFromRotationMatrix(world[hand.wrist]);
+  return wrist.multiply(new THREE.Quaternion(...hand.palm));
 }
 
 // Axes of the palm are abduction, flexion and length; seen from its back with the fingers up.
