@@ -27,6 +27,7 @@ REAL = [
 REAL_BVH = [
     "animated-drawings/jesse_dance",
     "animated-drawings/jumping_jacks",
+    "animated-drawings/wave_hello",
     "performs/Idle",
 ]
 
