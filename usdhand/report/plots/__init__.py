@@ -1,0 +1,1 @@
+"""Plots of results, in the manner of the papers' figures."""
