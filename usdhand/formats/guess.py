@@ -62,8 +62,8 @@ def guess_units(
     return cm, Problem("guessed-units", message, severity="note")
 
 
-def guess_up(poses: Iterable[Array]) -> tuple[str, Problem]:
-    """Up axis, "Y" or "Z", by the axis along which bodies are longer.
+def guess_up(poses: Iterable[Array], names: Iterable[str]) -> tuple[str, Problem]:
+    """Up axis: "Z" if a body with legs, by names, is clearly longer along Z than along Y, else "Y".
 
     Parameters
     ----------
@@ -75,7 +75,8 @@ def guess_up(poses: Iterable[Array]) -> tuple[str, Problem]:
         if len(positions):
             _, y, z = np.maximum(np.median(np.ptp(positions, axis=1), axis=0), 1e-9)
             said += float(np.clip(np.log(z / y), -2.0, 2.0))
-    up = "Z" if said > np.log(CLEARLY_LONGER) else "Y"
+    body = any(map(_LEG.search, names))  # hands alone may lie any way
+    up = "Z" if body and said > np.log(CLEARLY_LONGER) else "Y"
     message = f"the file does not say which axis is up: read as {up} up; --input-up says otherwise"
     return up, Problem("guessed-up-axis", message, severity="note")
 

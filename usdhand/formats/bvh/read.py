@@ -105,7 +105,7 @@ def _posed(path: Path, skel: str | None, cm_per_unit: float | None, up: str | No
         name=path.stem,
     )
     if up is None:
-        up, guessed = guess_up([_positions(zero), _positions(clip)])
+        up, guessed = guess_up([_positions(zero), _positions(clip)], hierarchy.names)
         problems.append(guessed)
     zero, clip = (_placed(c, cm_per_unit, up) for c in (zero, clip))
     skeleton, odd = choose_bind(zero, clip)
