@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -13,6 +13,8 @@ from usdhand.errors import InputError, UsageError
 from usdhand.formats.suffixes import READABLE
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from usdhand.errors import UsdHandError
     from usdhand.motion import Clip
 
@@ -44,6 +46,12 @@ report_option = click.option(
     metavar="FILE",
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the JSON document to a file as well.",
+)
+plots_option = click.option(
+    "--plots",
+    metavar="DIR",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Draw plots of the result into a folder, as SVG and PNG.",
 )
 side_option = click.option(
     "--side",
@@ -166,6 +174,25 @@ def write_report(path: Path | None, text: str, force: bool) -> None:
     check_report(path, force)
     with written_beside(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def check_plots(folder: Path | None, names: Iterable[str], force: bool) -> None:
+    """Refuse plots before any work is done; ``names`` are all that may come out."""
+    if folder is not None:
+        from usdhand.report.plots import style
+
+        style.check_plots(folder, names, force)
+
+
+def write_plots(
+    folder: Path | None, draw: Callable[[], Mapping[str, Figure]], force: bool, quiet: bool
+) -> None:
+    """Draw plots and write all of them or none."""
+    if folder is not None:
+        from usdhand.report.plots import style
+
+        style.write_plots(folder, draw(), force)
+        say(f"plots written to {folder}", quiet)
 
 
 def table(rows: Sequence[Sequence[str]], right: Iterable[int] = ()) -> str:

@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from usdhand.cli.common import (
+    check_plots,
     check_report,
     find_files,
     force_option,
     json_option,
     map_option,
+    plots_option,
     quiet_option,
     report_option,
     say,
     table,
     warn,
     with_progress,
+    write_plots,
     write_report,
 )
 
@@ -49,6 +52,7 @@ if TYPE_CHECKING:
 @click.option("--labels-only", is_flag=True, help="Only the share of labels, no reconstruction.")
 @map_option
 @report_option
+@plots_option
 @force_option
 @json_option
 @quiet_option
@@ -61,6 +65,7 @@ def command(
     labels_only: bool,
     maps: tuple[Path, ...],
     report: Path | None,
+    plots: Path | None,
     force: bool,
     as_json: bool,
     quiet: bool,
@@ -85,11 +90,13 @@ def command(
     from usdhand.fill.agreement import label_agreement
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import evaluation_result
+    from usdhand.report.plots import evaluating
 
     settings = replace(PAPER if preset == "paper" else FillSettings(), k=k)
     if metric:
         settings = replace(settings, metric=metric)
     check_report(report, force)
+    check_plots(plots, evaluating.NAMES, force)
     motions = filling.read_library(library)
     paths = find_files(takes) if takes else []
     agreements = []
@@ -119,6 +126,7 @@ def command(
     shown |= {"labels_only": labels_only, "fill": asdict(settings)}
     text = dumps(document("evaluate", [library, *paths, *maps], shown, result))
     write_report(report, text, force)
+    write_plots(plots, lambda: evaluating.figures(agreements, errors), force, quiet or as_json)
     if as_json:
         click.echo(text)
     else:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from usdhand.cli.common import (
+    check_plots,
     check_report,
     dry_run_option,
     flatten_option,
@@ -15,6 +16,7 @@ from usdhand.cli.common import (
     json_option,
     map_option,
     output_option,
+    plots_option,
     quiet_option,
     report_option,
     say,
@@ -24,8 +26,12 @@ from usdhand.cli.common import (
     verbose_option,
     warn,
     warn_of,
+    write_plots,
     write_report,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @click.command("fill")
@@ -74,6 +80,7 @@ from usdhand.cli.common import (
 @skel_option
 @map_option
 @report_option
+@plots_option
 @dry_run_option
 @force_option
 @json_option
@@ -96,6 +103,7 @@ def command(
     skel: str | None,
     maps: tuple[Path, ...],
     report: Path | None,
+    plots: Path | None,
     dry_run: bool,
     force: bool,
     as_json: bool,
@@ -124,6 +132,7 @@ def command(
     from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import fill_result
+    from usdhand.report.plots import filling as plotting
 
     given: dict[str, Any] = {"metric": metric, "k": k}
     settings = replace(
@@ -135,6 +144,7 @@ def command(
     given_files = [body, library, *([fingers_from] if fingers_from else [])]
     check_output(output, given_files, force, USD_SUFFIXES)
     check_report(report, force)
+    check_plots(plots, plotting.NAMES, force)
     conventions = api.conventions_from(maps)
     motions = filling.read_library(library)
     for entry in motions.damaged:
@@ -204,6 +214,13 @@ def command(
     shown |= {"skel": skel, "maps": maps, "flatten": flatten}
     text = dumps(document("fill", [*given_files, *maps], shown, result))
     write_report(report, text, force)
+
+    def draw() -> dict[str, Figure]:
+        return plotting.figures(
+            filled, clip, api.find_hands(clip, conventions, sides(side)), motions
+        )
+
+    write_plots(plots, draw, force, quiet or as_json)
     if as_json:
         click.echo(text)
         return

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from usdhand.cli.common import (
+    check_plots,
     check_report,
     dry_run_option,
     files_argument,
@@ -17,6 +18,7 @@ from usdhand.cli.common import (
     json_option,
     map_option,
     output_option,
+    plots_option,
     quiet_option,
     report_option,
     say,
@@ -28,6 +30,7 @@ from usdhand.cli.common import (
     warn,
     warn_of,
     with_progress,
+    write_plots,
     write_report,
 )
 
@@ -75,6 +78,7 @@ if TYPE_CHECKING:
 @skel_option
 @map_option
 @report_option
+@plots_option
 @dry_run_option
 @force_option
 @json_option
@@ -96,6 +100,7 @@ def command(
     skel: str | None,
     maps: tuple[Path, ...],
     report: Path | None,
+    plots: Path | None,
     dry_run: bool,
     force: bool,
     as_json: bool,
@@ -118,6 +123,7 @@ def command(
     from usdhand.errors import UsageError
     from usdhand.formats.output import make_folder
     from usdhand.report.document import document, dumps
+    from usdhand.report.plots import reducing
     from usdhand.report.results import reduce_result
 
     paths = find_files(clips)
@@ -148,6 +154,7 @@ def command(
     inputs = [*paths, *([rig_file] if rig_file else []), *maps]
     _check_outputs(outputs, inputs, force)
     check_report(report, force)
+    check_plots(plots, reducing.NAMES, force)
 
     conventions = api.conventions_from(maps)
     rig = api.read_rig(rig_file) if rig_file else None
@@ -184,6 +191,7 @@ def command(
         ):
             api.write_rig(reduction, target, flatten=flatten, force=force)
     write_report(report, text, force)
+    write_plots(plots, lambda: reducing.figures(reductions), force, quiet or as_json)
     if as_json:
         click.echo(text)
         return

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from usdhand.cli.common import (
+    check_plots,
     check_report,
     dry_run_option,
     flatten_option,
@@ -15,6 +16,7 @@ from usdhand.cli.common import (
     json_option,
     map_option,
     output_option,
+    plots_option,
     quiet_option,
     report_option,
     say,
@@ -24,8 +26,12 @@ from usdhand.cli.common import (
     verbose_option,
     warn,
     warn_of,
+    write_plots,
     write_report,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @click.command("splice")
@@ -68,6 +74,7 @@ from usdhand.cli.common import (
 @click.option("--hands-skel", metavar="PRIM", help="The same for the hand clip.")
 @map_option
 @report_option
+@plots_option
 @dry_run_option
 @force_option
 @json_option
@@ -87,6 +94,7 @@ def command(
     hands_skel: str | None,
     maps: tuple[Path, ...],
     report: Path | None,
+    plots: Path | None,
     dry_run: bool,
     force: bool,
     as_json: bool,
@@ -112,12 +120,14 @@ def command(
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps
+    from usdhand.report.plots import splicing as plotting
     from usdhand.report.splicing import splice_result
     from usdhand.splice import SpliceSettings
 
     settings = SpliceSettings(band=_widths(band), align=align, wrist=wrist)  # type: ignore[arg-type]
     check_output(output, [body, hands], force, USD_SUFFIXES)
     check_report(report, force)
+    check_plots(plots, plotting.NAMES, force)
     conventions = api.conventions_from(maps)
     clip, hand_clip = api.read_clip(body, skel), api.read_clip(hands, hands_skel)
     warn_of(clip, quiet)
@@ -142,6 +152,12 @@ def command(
     more = {"side": side, "skel": skel, "hands_skel": hands_skel}
     text = dumps(document("splice", [body, hands, *maps], shown | more, result))
     write_report(report, text, force)
+
+    def draw() -> dict[str, Figure]:
+        ours, theirs = (api.find_hands(c, conventions, sides(side)) for c in (clip, hand_clip))
+        return plotting.figures(spliced, clip, hand_clip, ours, theirs, settings)
+
+    write_plots(plots, draw, force, quiet or as_json)
     if as_json:
         click.echo(text)
         return

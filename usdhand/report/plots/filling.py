@@ -106,7 +106,7 @@ def graph(part: FilledPart, library: MotionLibrary) -> Figure:
     ]
     if starts:
         costs = np.array([edges[x][i, j] for x, i, j in starts])
-        least, greatest = np.quantile(costs, (0.05, 0.95)) + (1e-6, 2e-6)
+        least, greatest = np.quantile(costs, (0.05, 0.95)) + np.array([1e-6, 2e-6])
         dearest_first = np.argsort(-costs, kind="stable")
         lines = LineCollection(
             [[(x, i), (x + 1, j)] for x, i, j in (starts[n] for n in dearest_first)],
@@ -120,7 +120,8 @@ def graph(part: FilledPart, library: MotionLibrary) -> Figure:
         bar = figure.colorbar(lines, ax=panel, shrink=0.7, pad=0.01, extend="both")
         bar.set_label("transition cost")
         bar.ax.minorticks_off()
-        ticks = [float(f"{v:.1g}") for v in np.geomspace(least, greatest, 4)]
+        steps = [m * 10.0**e for e in range(-6, 9) for m in (1, 2, 5)]
+        ticks = [t for t in steps if least <= t <= greatest]
         bar.set_ticks(ticks, labels=[f"{t:g}" for t in ticks])
     chosen = [c.chosen for c in choices]
     panel.plot(range(len(choices)), chosen, color=ORANGE, linewidth=2.5, zorder=2)
