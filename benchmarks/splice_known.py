@@ -1,6 +1,6 @@
 """How exactly splice aligns pairs whose true alignment is known, beside simpler ways.
 
-Run: python benchmarks/splice_known.py [--takes FOLDER] [--space]
+Run: python benchmarks/splice_known.py [--takes FOLDER] [--space] [--seed N]
 
 Pairs are made of real takes, see tests/known_pairs.py. Counted are frames of the body at which the
 wrist moves, relative to the shoulder, faster than 15 cm/s. Errors are in the body's time: how far
@@ -27,7 +27,14 @@ from usdhand.anatomy import Side  # noqa: E402
 from usdhand.motion.rotations import Array  # noqa: E402
 from usdhand.splice.band import Band, pinned_band  # noqa: E402
 from usdhand.splice.markers import Markers, hand_markers  # noqa: E402
-from usdhand.splice.method import PAPER, SpliceSettings, align, splice  # noqa: E402
+from usdhand.splice.method import (  # noqa: E402
+    PAPER,
+    Alignment,
+    Spliced,
+    SpliceSettings,
+    align,
+    splice,
+)
 from usdhand.splice.phases import facing, smoothed, steady_turns  # noqa: E402
 
 SETTINGS = SpliceSettings()
@@ -39,18 +46,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--takes", type=Path, default=REAL)
     parser.add_argument("--space", action="store_true")
+    parser.add_argument("--seed", type=int, default=1000, help="of warps, turns and noise")
     arguments = parser.parse_args()
     noise = NOISE_CM / np.sqrt(3.0) if arguments.space else NOISE_CM
     errors: dict[str, Row] = {"used for tuning": defaultdict(list), "kept aside": defaultdict(list)}
     fingers: dict[str, list[float]] = {name: [] for name in errors}
     pairs = known_pairs(arguments.takes)
     for i, (body, hands) in enumerate(pairs):
-        pair = known_pair(body, hands, 1000 + i, noise)
+        pair = known_pair(body, hands, arguments.seed + i, noise)
         part = "kept aside" if i % 3 == 2 else "used for tuning"
-        for side in pair.body_hands.frames:
-            for name, error in pair_errors(pair, side).items():
+        spliced = splice(pair.body, pair.hands, pair.body_hands, pair.hand_hands)
+        for side, alignment in spliced.hands.items():
+            for name, error in pair_errors(pair, side, alignment).items():
                 errors[part][name].append(error)
-        fingers[part].append(finger_error(pair))
+        fingers[part].append(finger_error(pair, spliced))
     print(f"{len(pairs)} pairs, noise {10 * noise:.1f} mm a coordinate")
     for part, rows in errors.items():
         print(
@@ -67,12 +76,11 @@ def main() -> None:
             )
 
 
-def pair_errors(pair: Pair, side: Side) -> dict[str, Array]:
+def pair_errors(pair: Pair, side: Side, alignment: Alignment) -> dict[str, Array]:
     """Errors in seconds at moving frames, for each way to align."""
     body = hand_markers(pair.body, pair.body_hands, side, SETTINGS.fps)
     hand = hand_markers(pair.hands, pair.hand_hands, side, SETTINGS.fps)
     times = np.arange(len(pair.body)) / pair.body.fps
-    full, first, _ = align(body, hand, SETTINGS, (), times)
     _, axes, _ = align(body, hand, PAPER, (), times)
     turned = facing(hand, steady_turns(body, hand, np.linspace(0, len(hand) - 1, len(body)))[:1])
 
@@ -89,8 +97,8 @@ def pair_errors(pair: Pair, side: Side) -> dict[str, Array]:
         "DTW on positions": plain_warp(values(0), body, turned, times),
         "DTW on derivative values": plain_warp(derivatives, body, turned, times),
         "pass 1, signs along the 3 axes": axes,
-        "pass 1": first,
-        "full method": full,
+        "pass 1": alignment.phase_warp,
+        "full method": alignment.warp[:, 1],
     }
     moving = pair.moving(side)
     return {name: pair.error(warp)[moving] for name, warp in warps.items()}
@@ -123,9 +131,8 @@ def plain_dtw(cost: Array, band: Band) -> Array:
     return np.array([np.mean(columns) for columns in matched])
 
 
-def finger_error(pair: Pair) -> float:
+def finger_error(pair: Pair, spliced: Spliced) -> float:
     """RMS in degrees between the spliced and the true fingers, over the whole take."""
-    spliced = splice(pair.body, pair.hands, pair.body_hands, pair.hand_hands)
     ours, theirs = pair.body_hands.encode(spliced.clip), pair.source_channels()
     return float(np.sqrt(np.mean((ours.values - theirs.select(ours.names).values) ** 2)))
 

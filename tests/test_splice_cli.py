@@ -110,6 +110,7 @@ def test_dry_run_writes_nothing(run: Run, tmp_path: Path) -> None:
         (("--pin", "100:200", "--pin", "100:100"), "contradict"),
         (("--pin", "100"), "'100' is no pin"),
         (("--pin", "a:b"), "'a:b' is no pin"),
+        (("--pin", "nan:1"), "'nan:1' is no pin"),
         (("--band", "0.3"), "two numbers"),
         (("--band", "0,2"), "above 0"),
         ((), "beyond the band"),

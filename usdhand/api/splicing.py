@@ -59,7 +59,7 @@ def parse_pin(text: str, body: Clip, hands: Clip) -> Pin:
         numbers = [float(part) for part in (rest if side else text).split(":")]
     except ValueError:
         numbers = []
-    if len(numbers) not in (2, 3):
+    if len(numbers) not in (2, 3) or not np.isfinite(numbers).all():
         raise UsageError(
             f"'{text}' is no pin: give BODY:HAND or BODY:HAND:TOLERANCE in time codes, for one "
             "hand with left: or right: before it."
