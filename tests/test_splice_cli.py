@@ -17,6 +17,7 @@ from usdhand.api import find_hands, read_clip
 from usdhand.api.splicing import parse_pin, splice_hands
 from usdhand.cli.splice import command
 from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
+from usdhand.motion import Clip, Skeleton
 from usdhand.splice import SpliceSettings
 
 SAMPLES = REPOSITORY / "samples"
@@ -136,7 +137,7 @@ def test_pins_are_read_in_the_time_codes_of_their_clips() -> None:
 def test_hands_that_do_not_move() -> None:
     body = read_clip(FULL)
     still = replace(body, rotations=np.repeat(body.rotations[:1], len(body), axis=0), name="still")
-    with pytest.raises(InputError, match="nothing tells"):
+    with pytest.raises(InputError, match="No hand moves in the hand clip still, so nothing tells"):
         splice_hands(body, still)
     short = replace(still, rotations=still.rotations[:2])
     with pytest.raises(InputError, match="2 frames"):
@@ -162,6 +163,33 @@ def test_a_clip_that_shows_a_part_is_refused_with_the_pins_that_place_it(
     assert any("Nothing in the longer clip is like the shorter" in note for note in notes)
     with pytest.raises(UsageError, match=r"The body is like the hand clip from 0\.. s"):
         splice_hands(read_clip(HANDS), read_clip(FULL))
+
+
+def test_hands_without_a_finger_in_common() -> None:
+    """Of a body's hands only two fingers are left, of the hand clip's two other ones."""
+    full = read_clip(FULL)
+    index = without_fingers(full, "Ring", "Pinky", "Thumb")
+    ring = without_fingers(full, "Index", "Middle", "Thumb")
+    with pytest.raises(HandNotFoundError, match="no finger joint in common: the body has Index"):
+        splice_hands(index, ring)
+    part = splice_hands(full, ring)
+    assert not any("Index" in name for name in part.hands["left"].channels)
+
+
+def without_fingers(clip: Clip, *digits: str) -> Clip:
+    names = clip.skeleton.names
+    gone = {n for n in names if "Hand" in n and any(d in n for d in digits)}
+    keep = [j for j, name in enumerate(names) if name not in gone]
+    index = {j: k for k, j in enumerate(keep)}
+    skeleton = clip.skeleton
+    rig = Skeleton(
+        tuple(skeleton.joints[j] for j in keep),
+        np.array([index.get(int(skeleton.parents[j]), -1) for j in keep]),
+        skeleton.bind[keep],
+        skeleton.rest[keep],
+    )
+    q, t, s = (v[:, keep] for v in (clip.rotations, clip.translations, clip.scales))
+    return replace(clip, skeleton=rig, rotations=q, translations=t, scales=s)
 
 
 def test_long_differences_are_worth_a_warning() -> None:

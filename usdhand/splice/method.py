@@ -135,7 +135,7 @@ def splice(
     Raises
     ------
     HandNotFoundError
-        if the clips have no hand in common.
+        if the clips have no hand, or no finger joint of one, in common.
     InputError
         if no hand moves, so that there is nothing to align.
     UsageError
@@ -148,6 +148,14 @@ def splice(
         raise HandNotFoundError(
             "The clips have no hand in common: the body has {}, the hand clip {}.".format(*there)
         )
+    for side in sides:
+        fingers = [set(h.frames[side].names) for h in (body_hands, hand_hands)]
+        if not fingers[0] & fingers[1]:
+            ours, theirs = (", ".join(sorted(names)) for names in fingers)
+            raise HandNotFoundError(
+                f"The {side} hands have no finger joint in common: the body has {ours}; the hand "
+                f"clip {theirs}."
+            )
     pins = {s: checked_pins(settings.pins, s, body.duration, hand_clip.duration) for s in sides}
     for pin in settings.pins:
         if pin.side is not None and pin.side not in sides:
@@ -247,9 +255,15 @@ def _aligned_hands(
         if side not in still
     }
     if not found:
+        clips = {f"the body {body.name}": 0, f"the hand clip {hand_clip.name}": 1}
+        at_rest = [
+            name
+            for name, k in clips.items()
+            if all(_reach(both[k], settings.smoothing) < STILL for both in markers.values())
+        ]
+        where = " and ".join(at_rest) or f"both {body.name} and {hand_clip.name}"
         raise InputError(
-            f"No hand moves in both {body.name} and {hand_clip.name}, so nothing tells which "
-            "moments belong together."
+            f"No hand moves in {where}, so nothing tells which moments belong together."
         )
     notes = []
     for side in still:
