@@ -11,7 +11,7 @@ from usdhand.fill.agreement import Agreement
 from usdhand.fill.reconstruction import METHODS, HandError
 from usdhand.report.filling import evaluation_result
 from usdhand.report.plots import style
-from usdhand.report.plots.style import BLACK, BLUE, GREY, ORANGE, SKY, styled
+from usdhand.report.plots.style import BLACK, BLUE, GREY, ORANGE, SKY, YELLOW, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,7 +90,7 @@ def fingers(errors: Sequence[HandError]) -> Figure:
     units = (("degrees", "joint rotations, deg"), ("fingertip_mm", "fingertips, mm"))
     for panel, (key, label) in zip(axes, units, strict=True):
         most = 0.0
-        for number, (side, colour) in enumerate(zip(means, (SKY, BLUE), strict=False)):
+        for number, (side, colour) in enumerate(zip(means, (SKY, YELLOW), strict=False)):
             values = [means[side][method][key] for method in METHODS]
             at = rows + height * (number - (len(means) - 1) / 2)
             panel.barh(at, values, height, color=colour, label=f"{side} hand")
@@ -105,7 +105,7 @@ def fingers(errors: Sequence[HandError]) -> Figure:
                 color=BLACK,
                 markersize=2.5,
                 markeredgewidth=0,
-                alpha=0.5,
+                alpha=0.6,
                 rasterized=True,
             )
             for value, y in zip(values, at, strict=True):

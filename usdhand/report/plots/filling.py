@@ -11,10 +11,9 @@ from usdhand.anatomy import Hands
 from usdhand.fill import Filled, MotionLibrary
 from usdhand.fill.arm import arm_motion
 from usdhand.fill.library import ARM_FPS, Part, at_arm_rate
-from usdhand.fill.results import Choice, FilledPart
+from usdhand.fill.results import FilledPart
 from usdhand.fill.segment import wrist_speed
 from usdhand.motion import Clip
-from usdhand.motion.rotations import Array
 from usdhand.report.plots import style
 from usdhand.report.plots.style import BLACK, BLUE, GREY, ORANGE, styled
 
@@ -128,8 +127,16 @@ def graph(part: FilledPart, library: MotionLibrary) -> Figure:
     for x, (a, b) in enumerate(pairwise(chosen)):
         cost = f"{edges[x][a, b]:.3g}"
         _label(panel, x + 0.5, (a + b) / 2, cost, ORANGE, "white", 7)
+    names = [library.clips[i].name for i in part.space.clips]
+    short = style.shortened(
+        [names[candidate.segment] for choice in choices for candidate in choice.candidates], 17
+    )
     for x, (choice, layer) in enumerate(zip(choices, layers, strict=True)):
-        _nodes(panel, x, choice, layer.costs, part, library)
+        for y, (candidate, cost) in enumerate(zip(choice.candidates, layer.costs, strict=True)):
+            own = y == choice.chosen
+            start = part.space.firsts[candidate.segment] / ARM_FPS
+            text = f"{short[names[candidate.segment]]}\n{start:.1f} s, cost {cost:.3g}"
+            _label(panel, x, y, text, ORANGE if own else GREY, "#fdebdc" if own else "white", 6.5)
     panel.set_xlim(-0.5, len(choices) - 0.5)
     panel.set_ylim(most - 0.5, -0.5)
     panel.set_xticks(
@@ -142,22 +149,6 @@ def graph(part: FilledPart, library: MotionLibrary) -> Figure:
         "segment of the body; in the boxes: clip and second of the library, and segment cost"
     )
     return figure
-
-
-def _nodes(
-    panel: Axes,
-    x: int,
-    choice: Choice,
-    costs: Array,
-    part: FilledPart,
-    library: MotionLibrary,
-) -> None:
-    for y, (candidate, cost) in enumerate(zip(choice.candidates, costs, strict=True)):
-        own = y == choice.chosen
-        name = library.clips[int(part.space.clips[candidate.segment])].name
-        start = part.space.firsts[candidate.segment] / ARM_FPS
-        text = f"{style.shortened(name, 17)}\n{start:.1f} s, cost {cost:.3g}"
-        _label(panel, x, y, text, ORANGE if own else GREY, "#fdebdc" if own else "white", 6.5)
 
 
 def _label(panel: Axes, x: float, y: float, text: str, edge: str, face: str, size: float) -> None:

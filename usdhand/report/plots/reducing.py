@@ -61,19 +61,22 @@ def followers(reductions: Sequence[Reduction]) -> Figure | None:
     )
     values = _points(reductions)
     for panel, relation in zip(axes, shown, strict=True):
-        _follower(panel, relation, values)
+        _follower(panel, relation, values, connected=len(reductions) == 1)
     return figure
 
 
-def _follower(panel: Axes, relation: Relation, values: Mapping[str, Array]) -> None:
+def _follower(
+    panel: Axes, relation: Relation, values: Mapping[str, Array], connected: bool
+) -> None:
     first, slope = relation.controllers[0], relation.slopes[0]
     others = list(zip(relation.controllers[1:], relation.slopes[1:], strict=True))
     x, y = values[first], values[relation.name] - sum(s * values[c] for c, s in others)
-    panel.set_rasterization_zorder(3)  # thousands of points are no outlines for an SVG
-    panel.plot(x, y, color=LIGHT, linewidth=0.5, zorder=1)
-    panel.plot(x, y, ".", color=BLUE, markersize=2.5, markeredgewidth=0, zorder=2)
-    ends = np.array([np.nanmin(x), np.nanmax(x)])
-    panel.plot(ends, relation.offset + slope * ends, color=ORANGE, zorder=3)
+    panel.set_rasterization_zorder(0)  # thousands of points are no outlines for an SVG
+    if connected:
+        panel.plot(x, y, color=LIGHT, linewidth=0.5, zorder=-2)
+    panel.plot(x, y, ".", color=BLUE, markersize=2.5, markeredgewidth=0, zorder=-1)
+    ends = np.array([x.min(), x.max()])
+    panel.plot(ends, relation.offset + slope * ends, color=ORANGE)
     panel.set_title(f"RMS error {relation.rms_error:.1f} deg", fontsize=8)
     panel.set_xlabel(f"{first}, deg", fontsize=8)
     without = f"\nless part of {', '.join(c for c, _ in others)}" if others else ""
@@ -136,15 +139,15 @@ def curves(reductions: Sequence[Reduction]) -> Figure | None:
     if not order:
         return None
     figure, axes = style.small_multiples(
-        f"The {len(order)} channels that reduction changes most", len(order), (4.8, 1.7), 2
+        f"The {len(order)} channels that reduction changes most", len(order), (4.8, 1.8), 2
     )
     for panel, channel in zip(axes, order, strict=True):
         number = int(lost[:, channel].argmax())
         relation, error = rig.relations[channel], lost[number, channel]
         _curve(panel, reductions[number], relation.name)
-        where = f" in {reductions[number].clip.name}" if len(reductions) > 1 else ""
+        where = f"\nin {reductions[number].clip.name}" if len(reductions) > 1 else ""
         title = f"{relation.name} {_how(relation)}: RMS error {error:.1f} deg{where}"
-        panel.set_title(style.shortened(title, 75), fontsize=8)
+        panel.set_title(title, fontsize=8)
     for panel in axes[-2:]:
         panel.set_xlabel("seconds")
     lines = axes[0].get_lines()
@@ -207,13 +210,13 @@ def _stacked(reductions: Sequence[Reduction]) -> Array:
 
 
 def _points(reductions: Sequence[Reduction]) -> dict[str, Array]:
-    """Some values of every modelled channel, with a gap (nan) behind every clip."""
+    """Some values of every modelled channel, evenly spread over every clip."""
     names = reductions[0].rig.names
     parts = []
     for reduction in reductions:
         curves = reduction.source.select(names).values
         at = style.sampled(len(curves), max(SCATTER_POINTS // len(reductions), 2))
-        parts += [curves[at], np.full((1, len(names)), np.nan)]
+        parts.append(curves[at])
     return dict(zip(names, np.concatenate(parts).T, strict=True))
 
 

@@ -186,9 +186,11 @@ def curves(
     hand_at = np.arange(hand_begin, hand_end, 1 / theirs.fps)
     warp = np.interp(body_at, *alignment.warp.T)
     moving = _most_moving(alignment.channels, fingers[0])
+    other = alignment.taken_from
+    follows = f", which follows the {other} one" if other else ""
     rows = [("wrist's height\nfrom its mean, cm", _height), ("bend of the wrist,\ndeg", _bend)]
     figure, axes = style.new_figure(
-        f"{side.capitalize()} hand: both clips before and after alignment",
+        f"{side.capitalize()} hand{follows}: both clips before and after alignment",
         (10.5, 1.0 + 1.6 * (len(rows) + bool(moving))),
         len(rows) + bool(moving),
         2,

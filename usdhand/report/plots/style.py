@@ -25,7 +25,7 @@ R = TypeVar("R")
 
 # Okabe and Ito's colours, which people of all kinds of colour vision tell apart.
 BLACK, GREY, LIGHT = "#222222", "#8c8c8c", "#d9d9d9"
-BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9"
+BLUE, SKY, ORANGE, YELLOW = "#0072b2", "#56b4e9", "#d55e00", "#e69f00"
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib
@@ -51,10 +51,11 @@ STYLE: dict[str, Any] = {
     "legend.fontsize": 8.0,
     "lines.linewidth": 1.3,
     "text.color": BLACK,
-    "savefig.dpi": 120.0,
+    "savefig.dpi": 110.0,
 }
 SUFFIXES = (".svg", ".png")
 MOST_POINTS = 800  # of a curve: more than a plot is wide show nothing more
+RASTER_DPI = 90  # of what is pixels within an SVG
 FILE_SETTINGS = {"svg.fonttype": "path", "path.simplify": True}
 NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}  # same in, same out
 
@@ -176,7 +177,7 @@ def _drawn(name: str, figure: Figure, suffix: str) -> bytes:
             figure.set_layout_engine("none")
         buffer = io.BytesIO()
         if suffix == ".svg":
-            figure.savefig(buffer, format="svg", metadata=NO_METADATA)
+            figure.savefig(buffer, format="svg", dpi=RASTER_DPI, metadata=NO_METADATA)
             return own_ids(buffer.getvalue().decode("utf-8"), name).encode("utf-8")
         figure.savefig(buffer, format="png", metadata={"Software": None})
         return buffer.getvalue()
@@ -187,9 +188,20 @@ def own_ids(svg: str, name: str) -> str:
     return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", svg)
 
 
-def shortened(text: str, most: int) -> str:
-    """Text of at most ``most`` characters."""
-    return text if len(text) <= most else text[: most - 1] + "\N{HORIZONTAL ELLIPSIS}"
+def shortened(names: Sequence[str], most: int) -> dict[str, str]:
+    """Names of at most ``most`` characters: without their common beginning and long middles."""
+    ends = zip(min(names), max(names), strict=False)
+    common = next((i for i, (a, b) in enumerate(ends) if a != b), 0)
+
+    def short(name: str) -> str:
+        if len(name) <= most:
+            return name
+        rest = name[common:]
+        if len(rest) <= most:
+            return rest
+        return f"{rest[: most // 2]}\N{HORIZONTAL ELLIPSIS}{rest[len(rest) - (most - 1) // 2 :]}"
+
+    return {name: short(name) for name in names}
 
 
 def spread(items: Sequence[Any], most: int) -> list[Any]:
