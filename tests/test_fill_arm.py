@@ -12,7 +12,13 @@ from numpy.testing import assert_allclose
 
 from usdhand import api
 from usdhand.errors import HandNotFoundError
-from usdhand.fill.arm import ArmMotion, arm_motion, mirrored
+from usdhand.fill.arm import (
+    REFERENCE_HEIGHT_CM,
+    ArmMotion,
+    arm_motion,
+    body_height,
+    mirrored,
+)
 from usdhand.motion.rotations import Array
 
 SAMPLES = REPOSITORY / "samples"
@@ -81,3 +87,16 @@ def test_hands_alone_work(name: str) -> None:
     for side in hands.frames:
         arm: Array = arm_motion(clip, hands, side).hips_position
         assert np.isfinite(arm).all()
+
+
+def test_a_body_in_one_place_has_the_reference_height() -> None:
+    """Instead of none, by which everything would be divided."""
+    clip = api.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
+    hands = api.find_hands(clip)
+    bind = clip.skeleton.bind.copy()
+    bind[:, :3, 3] *= 1e-6
+    assert body_height(replace(clip.skeleton, bind=bind), hands) == REFERENCE_HEIGHT_CM
+    lying = clip.skeleton.bind.copy()
+    lying[:, :3, 3] = lying[:, [0, 2, 1], 3]  # the height of the head is no measure: arms are
+    height = body_height(replace(clip.skeleton, bind=lying), hands)
+    assert 100 < height < 250

@@ -18,6 +18,7 @@ from usdhand.motion.rotations import Array
 
 REFERENCE_HEIGHT_CM = 170.0
 SMALLEST_HEIGHT_CM = 1.0  # less is no body, but joints in one place
+LEAST_STANDING = 0.5  # of the height that the arms tell: less, and the body does not stand
 HEAD_TO_HEIGHT = 0.93  # lowest joint to the head joint, which lies at the top of the neck
 ARM_TO_HEIGHT = 0.332  # shoulder to wrist
 FOREARM_TO_ARM = 0.44
@@ -58,16 +59,16 @@ def body_height(skeleton: Skeleton, hands: Hands) -> float:
     (Winter, Biomechanics and Motor Control of Human Movement, 2009, figure 4.1).
     """
     character = hands.character
+    length = max(_arm_length(skeleton, h) for h in character.hands.values())
+    height = length / ARM_TO_HEIGHT
     if character.head is not None and character.hips is not None:
         hips = character.hips
         body = [j for j in range(len(skeleton)) if j == hips or hips in skeleton.ancestors(j)]
         heights = skeleton.bind_positions[:, 1]
         # Not to the highest joint: some rigs have eyes, hair or an end above the head joint.
-        height = float(heights[character.head] - heights[body].min()) / HEAD_TO_HEIGHT
-        if height > SMALLEST_HEIGHT_CM:  # else the bind pose does not stand
-            return height
-    length = max(_arm_length(skeleton, h) for h in character.hands.values())
-    height = length / ARM_TO_HEIGHT
+        standing = float(heights[character.head] - heights[body].min()) / HEAD_TO_HEIGHT
+        if standing > LEAST_STANDING * height:  # else the bind pose lies
+            height = standing
     return height if height > SMALLEST_HEIGHT_CM else REFERENCE_HEIGHT_CM
 
 
