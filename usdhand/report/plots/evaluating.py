@@ -54,13 +54,16 @@ def features(agreements: Sequence[Agreement]) -> Figure:
 def confusion(agreement: Agreement) -> Figure:
     """Which labels the nearest segments of each label have."""
     count = len(agreement.labels)
-    size = 0.48 * count
+    many = count > 16
+    size = (0.32 if many else 0.48) * count
     figure, [panel] = style.new_figure(
         f"Labels found by {agreement.metric}, % of the nearest", (size + 2.4, size + 1.9)
     )
     percent = 100.0 * agreement.confusion
     panel.imshow(percent, cmap="Blues", vmin=0, vmax=100)
     for (row, column), value in np.ndenumerate(percent):
+        if many and value < 0.5:
+            continue
         colour = "white" if value > 55 else BLACK if value >= 0.5 else GREY
         panel.text(column, row, f"{value:.0f}", ha="center", va="center", color=colour, fontsize=8)
     names = [label.replace("_", " ") for label in agreement.labels]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 NAMES = ("reduce_followers", "reduce_histograms", "reduce_curves", "reduce_errors")
 MOST_FOLLOWERS, MOST_CURVES = 12, 6
-SCATTER_POINTS = 1000
+SCATTER_POINTS = 700
 BIN_WIDTHS = (
     1.0,
     2.0,
@@ -48,7 +48,8 @@ def figures(reductions: Sequence[Reduction]) -> dict[str, Figure]:
 def followers(reductions: Sequence[Reduction]) -> Figure | None:
     """Dependent against controlling channels, with the line that replaces them; None of none."""
     rig = reductions[0].rig
-    linear = sorted((r for r in rig.relations if r.kind == "linear"), key=lambda r: r.rms_error)
+    lost = dict(zip(rig.names, _rms(reductions), strict=True))
+    linear = sorted((r for r in rig.relations if r.kind == "linear"), key=lambda r: lost[r.name])
     if not linear:
         return None
     shown = style.spread(linear, MOST_FOLLOWERS)
@@ -62,6 +63,7 @@ def followers(reductions: Sequence[Reduction]) -> Figure | None:
     values = _points(reductions)
     for panel, relation in zip(axes, shown, strict=True):
         _follower(panel, relation, values, connected=len(reductions) == 1)
+        panel.set_title(f"RMS error {lost[relation.name]:.1f} deg", fontsize=8)
     return figure
 
 
@@ -77,7 +79,6 @@ def _follower(
     panel.plot(x, y, ".", color=BLUE, markersize=2.5, markeredgewidth=0, zorder=-1)
     ends = np.array([x.min(), x.max()])
     panel.plot(ends, relation.offset + slope * ends, color=ORANGE)
-    panel.set_title(f"RMS error {relation.rms_error:.1f} deg", fontsize=8)
     panel.set_xlabel(f"{first}, deg", fontsize=8)
     without = f"\nless part of {', '.join(c for c, _ in others)}" if others else ""
     panel.set_ylabel(f"{relation.name}, deg{without}", fontsize=8)
@@ -96,7 +97,7 @@ def histograms(reductions: Sequence[Reduction]) -> Figure:
         "How far channels move, and how alike pairs of them do", (9.5, 2.9), 1, 3
     )
     widest = float(statistics.range.max(initial=0.0))
-    step = next(s for s in BIN_WIDTHS if widest <= 25 * s)
+    step = next((s for s in BIN_WIDTHS if widest <= 25 * s), BIN_WIDTHS[-1])
     bins = [step * i for i in range(max(int(np.ceil(widest / step)), 1) + 1)]
     widths.hist(statistics.range, bins, color=BLUE, edgecolor="white")
     widths.set_xlim(left=0)
@@ -190,9 +191,7 @@ def errors(reductions: Sequence[Reduction]) -> Figure:
         panel.plot(counts[there], by_count[there], color=colour, label=label, linewidth=width)
     bound = [pca_rms(stacked, int(n)) for n in counts]
     panel.plot(counts, bound, "--", color=GREY, label="PCA: the least of any linear model")
-    each = np.array([r.errors.rms_deg for r in reductions])
-    weights = np.array([len(r.clip) for r in reductions])
-    own = float(np.sqrt(np.average(each**2, weights=weights)))
+    own = float(np.sqrt(np.mean(_rms(reductions) ** 2)))
     label = f"this rig: {len(rig.free)} free, {own:.2f} deg"
     panel.plot([len(rig.free)], [own], "o", color=ORANGE, label=label)
     panel.set_xlim(0, len(rig.names))
@@ -218,6 +217,12 @@ def _points(reductions: Sequence[Reduction]) -> dict[str, Array]:
         at = style.sampled(len(curves), max(SCATTER_POINTS // len(reductions), 2))
         parts.append(curves[at])
     return dict(zip(names, np.concatenate(parts).T, strict=True))
+
+
+def _rms(reductions: Sequence[Reduction]) -> Array:
+    """RMS error (channels,) of every modelled channel over all clips, degrees."""
+    squares = [r.errors.rms**2 for r in reductions]
+    return np.sqrt(np.average(squares, axis=0, weights=[len(r.clip) for r in reductions]))
 
 
 def _statistics(reductions: Sequence[Reduction]) -> Statistics:
