@@ -172,7 +172,7 @@ def test_it_opens_and_shows_a_character_on_each_lane(pages: Pages, folder: Path)
     assert page.page.locator("#trouble").is_hidden()
 
 
-@pytest.mark.parametrize("name", ["fill", "splice"])
+@pytest.mark.parametrize("name", ["fill", pytest.param("splice", marks=pytest.mark.slow)])
 def test_motion_on_the_page_is_that_of_the_clip(pages: Pages, folder: Path, name: str) -> None:
     """The page's own modules, posed at whole and half frames, against our kinematics."""
     page = pages.open(folder / f"{name}.html")
@@ -223,6 +223,7 @@ def test_play_and_pause_with_button_and_key(pages: Pages, folder: Path) -> None:
     assert play.text_content() == "Play"
 
 
+@pytest.mark.slow
 def test_playing_keeps_the_time_of_the_clock(pages: Pages, folder: Path) -> None:
     page = pages.open(folder / "reduce.html")
     page.page.select_option("#speed", "0.5")
@@ -362,7 +363,7 @@ def test_close_ups_follow_the_hands(pages: Pages, folder: Path) -> None:
 
 
 def test_orbit_and_zoom_with_mouse_and_keys(pages: Pages, folder: Path) -> None:
-    page = pages.open(folder / "reduce.html")
+    page = pages.open(folder / "fill.html")
     seen = [page.picture]
     box = page.page.locator("#view").bounding_box()
     page.page.mouse.move(box["x"] + 200, box["y"] + 200)
