@@ -78,3 +78,20 @@ def test_links_between_pages_lead_somewhere() -> None:
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             if "://" not in target:
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_files_that_pages_name_are_there() -> None:
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for name in re.findall(r"`((?:usdhand|tests|benchmarks|docs|samples|schemas)/[\w/.-]+)`", text):
+            assert (REPOSITORY / name).exists(), f"{page.name}: {name}"
+
+
+def test_the_map_from_papers_names_modules_that_are_there() -> None:
+    rows = (REPOSITORY / "docs" / "papers.md").read_text(encoding="utf-8").splitlines()
+    for row in (r for r in rows if r.startswith("|")):
+        names = re.findall(r"`([\w/]+\.py)`", row)
+        folders = [Path(n).parent for n in names if "/" in n]
+        for name in names:
+            places = [Path(name), *(folder / name for folder in folders)]
+            assert any((REPOSITORY / place).exists() for place in places), name
