@@ -1,4 +1,4 @@
-"""The wheel holds what an installation needs: the schema, the conventions, the types marker."""
+"""The wheel holds what an installation needs: the schema, the conventions, the page, the types marker."""
 
 import subprocess
 import sys
@@ -11,6 +11,10 @@ WANTED = (
     "usdhand/schemas/generatedSchema.usda",
     "usdhand/schemas/schema.usda",
     "usdhand/anatomy/conventions.toml",
+    "usdhand/formats/fbx/worker.py",
+    "usdhand/report/preview/viewer/page.html",
+    "usdhand/report/preview/viewer/three.core.min.js",
+    "usdhand/report/preview/viewer/THREE-LICENSE.txt",
     "usdhand/py.typed",
 )
 

@@ -21,6 +21,7 @@ __all__ = [
     "expand_onto",
     "fill_fingers",
     "find_hands",
+    "preview_clips",
     "read_clip",
     "read_library",
     "read_rig",
@@ -31,6 +32,7 @@ __all__ = [
     "write_filled",
     "write_library",
     "write_new",
+    "write_preview",
     "write_rig",
     "write_spliced",
 ]
