@@ -1,4 +1,4 @@
-"""The wheel holds what an installation needs: the schema, the conventions, the page, the types marker."""
+"""The wheel holds what an installation needs beside modules: schema, conventions, the page."""
 
 import subprocess
 import sys
