@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,9 +71,9 @@ def prepare_query(index: SearchIndex, exact: NDArray[np.float32], max_ratio: flo
     parts = np.searchsorted(time, PART_EDGES, side="right").astype(np.int64)
     parts[0] = 0
     means = np.zeros((len(parts) - 1, width))
-    for part, (start, stop) in enumerate(pairwise(parts)):
-        if start < stop:
-            means[part] = exact[start:stop].mean(axis=0, dtype=np.float64)
+    counts = np.diff(parts)
+    sums = np.add.reduceat(exact, parts[:-1][counts > 0], axis=0, dtype=np.float64)
+    means[counts > 0] = sums / counts[counts > 0, None]
     means = (means - index.box_origin) / index.box_unit
     first, last = _candidates(n, index.lengths, max_ratio)
     reach = CODES / 2 * index.code_step
