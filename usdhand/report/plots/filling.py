@@ -59,7 +59,7 @@ def speed(part: FilledPart, body: Clip, hands: Hands) -> Figure:
     rows = max(1, int(np.ceil(shown / ROW_S - 1e-9)))
     which = "" if shown == end else f", the first {shown:.0f} of {end:.0f} s"
     figure, axes = style.new_figure(
-        f"{_of(part.part, 'wrist')}: speed, and its {len(choices)} segments{which}",
+        f"{_of(part.part, 'wrist')}: speed, and where it is cut into segments{which}",
         (9.5, 0.9 + 1.5 * rows),
         rows,
         sharey=True,
@@ -98,7 +98,7 @@ def graph(part: FilledPart, library: MotionLibrary) -> Figure:
     which = "" if len(choices) == total else f", the first {len(choices)} of {total} segments"
     figure, [panel] = style.new_figure(
         f"{_of(part.part, 'hand')}: the cheapest path through the candidates{which}",
-        (max(1.4 * len(choices), 4.0) + 1.0, 1.2 + 0.72 * most),
+        (max(1.4 * len(choices), 6.0) + 1.0, 1.2 + 0.72 * most),
     )
     starts = [
         (x, i, j) for x, e in enumerate(edges) for i in range(len(e)) for j in range(e.shape[1])

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 NAMES = ("reduce_followers", "reduce_histograms", "reduce_curves", "reduce_errors")
 MOST_FOLLOWERS, MOST_CURVES = 12, 6
-SCATTER_POINTS = 700
+SCATTER_POINTS = 600
+SEEN_DEG = 0.01  # a smaller error is not worth a plot
 BIN_WIDTHS = (
     1.0,
     2.0,
@@ -90,7 +91,7 @@ def histograms(reductions: Sequence[Reduction]) -> Figure:
     """How far channels move, and how alike pairs of them move in the same and opposite sense."""
     rig, statistics = reductions[0].rig, _statistics(reductions)
     pairs = np.triu_indices(len(rig.names), k=1)
-    moving = statistics.std > 0
+    moving = statistics.moving(0.0)
     both = moving[pairs[0]] & moving[pairs[1]]
     correlation = statistics.correlation[pairs][both]
     figure, (widths, same, opposite) = style.new_figure(
@@ -136,7 +137,7 @@ def curves(reductions: Sequence[Reduction]) -> Figure | None:
     lost = np.stack([r.errors.rms for r in reductions])
     lost[:, [relation.kind == "free" for relation in rig.relations]] = 0.0
     worst = lost.max(axis=0)
-    order = [int(i) for i in np.argsort(-worst, kind="stable")[:MOST_CURVES] if worst[i] > 0]
+    order = [int(i) for i in np.argsort(-worst, kind="stable")[:MOST_CURVES] if worst[i] > SEEN_DEG]
     if not order:
         return None
     figure, axes = style.small_multiples(

@@ -51,11 +51,10 @@ STYLE: dict[str, Any] = {
     "legend.fontsize": 8.0,
     "lines.linewidth": 1.3,
     "text.color": BLACK,
-    "savefig.dpi": 110.0,
 }
 SUFFIXES = (".svg", ".png")
 MOST_POINTS = 800  # of a curve: more than a plot is wide show nothing more
-RASTER_DPI = 90  # of what is pixels within an SVG
+PNG_DPI, SVG_DPI = 110, 90  # the latter of what is pixels within an SVG
 FILE_SETTINGS = {"svg.fonttype": "path", "path.simplify": True}
 NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}  # same in, same out
 
@@ -169,7 +168,10 @@ def _files(folder: Path, names: Iterable[str]) -> list[Path]:
 def _drawn(name: str, figure: Figure, suffix: str) -> bytes:
     """A figure as the content of a file, the same whenever it is drawn."""
     import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
+    # Not by savefig, which draws everything twice.
     with look(), matplotlib.rc_context({**FILE_SETTINGS, "svg.hashsalt": name}):
         engine = figure.get_layout_engine()
         if engine is not None:  # once is enough
@@ -177,9 +179,11 @@ def _drawn(name: str, figure: Figure, suffix: str) -> bytes:
             figure.set_layout_engine("none")
         buffer = io.BytesIO()
         if suffix == ".svg":
-            figure.savefig(buffer, format="svg", dpi=RASTER_DPI, metadata=NO_METADATA)
+            figure.dpi = SVG_DPI
+            FigureCanvasSVG(figure).print_svg(buffer, metadata=NO_METADATA)
             return own_ids(buffer.getvalue().decode("utf-8"), name).encode("utf-8")
-        figure.savefig(buffer, format="png", metadata={"Software": None})
+        figure.dpi = PNG_DPI
+        FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
         return buffer.getvalue()
 
 
