@@ -104,7 +104,7 @@ def histograms(reductions: Sequence[Reduction]) -> Figure:
     widths.set_xlim(left=0)
     widths.locator_params(axis="y", integer=True)
     held = int((~statistics.moving(rig.range_threshold)).sum())
-    _threshold(widths, rig.range_threshold, f"below {rig.range_threshold:.3g} deg: {held} constant")
+    _threshold(widths, rig.range_threshold, f"below {rig.range_threshold:.3g} deg: {held} channels")
     widths.set_title(f"range of {len(rig.names)} channels")
     widths.set_xlabel("range, deg")
     widths.set_ylabel("channels")

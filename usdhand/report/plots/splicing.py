@@ -199,6 +199,8 @@ def curves(
     )
     for before, after, (label, measure) in zip(axes[::2], axes[1::2], rows, strict=False):
         body, hand = (_at(measure(m), m.fps, at) for m, at in ((ours, body_at), (theirs, hand_at)))
+        if measure is _height:  # performers stand and reach differently
+            body, hand = body - body.mean(), hand - hand.mean()
         _line(before, body_at - begin, body, BLACK, "body")
         _line(before, hand_at - hand_begin, hand, ORANGE, "hand clip")
         _line(after, body_at, body, BLACK, "body")
@@ -213,7 +215,8 @@ def curves(
         for pin in alignment.pins:
             panel.axvline(pin.body, color=GREY, linewidth=0.8, linestyle=":")
     axes[0].set_title("before: each clip in its own time")
-    axes[1].set_title("after: in the time of the body")
+    dotted = " (dotted: pins)" if alignment.pins else ""
+    axes[1].set_title(f"after: in the time of the body{dotted}")
     axes[-2].set_xlabel("seconds of each clip, from its first that is used")
     axes[-1].set_xlabel("seconds of the body")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
@@ -232,7 +235,7 @@ def _line(panel: Axes, seconds: Array, values: Array, colour: str, label: str) -
 
 
 def _height(markers: Markers) -> Array:
-    return np.asarray(markers.wrist[:, 1] - markers.wrist[:, 1].mean())
+    return np.asarray(markers.wrist[:, 1])
 
 
 def _bend(markers: Markers) -> Array:
