@@ -6,6 +6,7 @@ import importlib.util
 import re
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -74,6 +75,16 @@ def test_own_settings_of_matplotlib_do_not_matter(tmp_path: Path) -> None:
     plain = drawn("plain")
     with matplotlib.rc_context({"font.size": 30, "svg.fonttype": "none", "axes.grid": True}):
         assert drawn("other") == plain
+
+
+@pytest.mark.filterwarnings("error")
+def test_names_are_no_formulas(tmp_path: Path) -> None:
+    labels = ("$\\frac$", "a--b <&> $", "\N{CJK UNIFIED IDEOGRAPH-624B}_{^")
+    agreement = Agreement("$near$", labels, 0.5, np.eye(3), 10)
+    figures = evaluating.figures([agreement], [])
+    style.write_plots(tmp_path, figures, force=False)
+    for path in tmp_path.glob("*.svg"):
+        ElementTree.parse(path)
 
 
 def test_all_or_nothing_and_force(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import io
 import re
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -51,11 +52,11 @@ STYLE: dict[str, Any] = {
     "legend.fontsize": 8.0,
     "lines.linewidth": 1.3,
     "text.color": BLACK,
+    "text.parse_math": False,  # names of clips are no formulas
 }
 SUFFIXES = (".svg", ".png")
 MOST_POINTS = 800  # of a curve: more than a plot is wide show nothing more
 PNG_DPI, SVG_DPI = 110, 90  # the latter of what is pixels within an SVG
-FILE_SETTINGS = {"svg.fonttype": "path", "path.simplify": True}
 NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}  # same in, same out
 
 
@@ -77,7 +78,9 @@ def look() -> Iterator[None]:
     require()
     from matplotlib import style
 
-    with style.context(["default", STYLE]):
+    with style.context(["default", STYLE]), warnings.catch_warnings():
+        # The picture shows it: names in scripts that the font lacks are boxes.
+        warnings.filterwarnings("ignore", r"Glyph \d+")
         yield
 
 
@@ -172,7 +175,7 @@ def _drawn(name: str, figure: Figure, suffix: str) -> bytes:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     # Not by savefig, which draws everything twice.
-    with look(), matplotlib.rc_context({**FILE_SETTINGS, "svg.hashsalt": name}):
+    with look(), matplotlib.rc_context({"svg.hashsalt": name}):
         engine = figure.get_layout_engine()
         if engine is not None:  # once is enough
             engine.execute(figure)
