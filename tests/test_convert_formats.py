@@ -136,6 +136,39 @@ def test_all_takes_of_a_file_are_written(tmp_path: Path) -> None:
     run("convert", takes[0], "-o", tmp_path / "a.usdc", "--animation", names[0])
 
 
+@pytest.mark.real_data
+def test_a_file_of_several_takes_is_inspected_and_can_get_fingers(
+    tmp_path: Path, library: Path
+) -> None:
+    pytest.importorskip("ufbx", reason="FBX needs the extra 'convert'")
+    take = sorted(shared_data("studiogalt", "fbx").glob("*_7_*Full.fbx"))[0]
+    names = animation_names(take)
+    text = run("inspect", take).output
+    assert all(f"'{name}'" in text for name in names)
+    refused = run("fill", take, "--library", library, "-o", tmp_path / "a.usda", code=2).output
+    assert "usdhand convert FILE --animation NAME" in refused
+    result = run("convert", TALK, "--onto", take, "-o", tmp_path / "a.usdc")
+    assert f"{len(names)} animations: its body stays at the bind pose" in result.output
+
+
+def test_what_onto_leaves_out_is_said(tmp_path: Path) -> None:
+    right = SAMPLES / "hands" / "talk_01_hands_right.usdc"
+    data = json.loads(
+        run("convert", right, "--onto", TALK, "-o", tmp_path / "a.usdc", "--json", "-q").output
+    )
+    lost = {p["code"]: p["message"] for p in data["files"][0]["lost"]}
+    assert "has no left hand" in lost["no-common-hand"]
+    assert "is cut for the last 16." in lost["other-length"]
+
+
+def test_odd_bytes_in_names_are_no_traceback(tmp_path: Path) -> None:
+    bvh = tmp_path / "take\udcff.bvh"
+    run("convert", TALK, "-o", bvh, "--trim", "1:5")
+    report = tmp_path / "report.json"
+    run("convert", bvh, "-o", tmp_path / "a.usda", "--report", report, "--json")
+    assert json.loads(report.read_text())["files"][0]["path"] == str(bvh)
+
+
 def test_units_and_up_axis_can_be_said(tmp_path: Path) -> None:
     bvh = tmp_path / "a.bvh"
     run("convert", TALK, "-o", bvh, "--trim", "1:5")

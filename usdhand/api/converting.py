@@ -8,10 +8,18 @@ from typing import Literal
 
 import numpy as np
 
-from usdhand.anatomy import Conventions, map_character
+from usdhand.anatomy import SIDES, Conventions, map_character
 from usdhand.api.clips import find_hands
 from usdhand.errors import HandNotFoundError, UsageError
-from usdhand.formats.files import DEFAULT, Reading, is_usd, read_any, write_other
+from usdhand.formats.files import (
+    DEFAULT,
+    Reading,
+    animation_names,
+    is_usd,
+    read_any,
+    read_character,
+    write_other,
+)
 from usdhand.formats.output import check_output, written_beside
 from usdhand.formats.suffixes import USD_SUFFIXES, WRITABLE
 from usdhand.formats.usd.character import character_of, legal_clip
@@ -62,7 +70,7 @@ class Converted:
     clip : the motion that the output shows
     source : the clip as it was read
     animated : whether there is motion, or a bind pose only
-    lost : what the output's format could not keep
+    lost : what the output's format could not keep, and motion or hands that --onto left out
     """
 
     clip: Clip
@@ -97,12 +105,16 @@ def convert(
     edits, output = edits or Edits(), Path(output)
     inputs = [Path(path), *([Path(onto)] if onto else [])]
     check_output(output, inputs, force, WRITABLE)
+    if edits.up == "Z" and output.suffix.lower() in (".glb", ".gltf"):
+        raise UsageError(f"{output}: glTF is always Y up, so --up Z cannot be had.")
+    lost: tuple[Problem, ...] = ()
     source, animated = read_any(path, reading=reading)
     if onto is None:
         body, body_file, body_reading, fingers = source, Path(path), reading, None
     else:
-        body, _ = read_any(onto, reading=onto_reading)
+        body, unread = _character(Path(onto), onto_reading)
         body_file, body_reading, fingers, animated = Path(onto), onto_reading, source, True
+        lost = (*unread, *_left_out(source, body, conventions))
     usd_to_usd = is_usd(body_file) and output.suffix.lower() in USD_SUFFIXES
 
     def motion(clip: Clip) -> Clip:
@@ -110,7 +122,6 @@ def convert(
             clip = retarget_hands(fingers, clip, conventions)
         return edit_frames(clip, edits, conventions)
 
-    lost: tuple[Problem, ...] = ()
     if usd_to_usd:
         moved = motion(body)
         placement = _placement(moved, edits, retimed=fingers is not None)
@@ -123,7 +134,8 @@ def convert(
         if edits.start is not None:
             clip = starting_at(clip, edits.start)
         if not dry_run:
-            lost = write_new(clip, output, up=edits.up or "Y", animated=animated, force=force)
+            up = edits.up or "Y"
+            lost += write_new(clip, output, up=up, animated=animated, force=force)
     return Converted(clip, source, animated, lost)
 
 
@@ -202,7 +214,7 @@ def _placement(clip: Clip, edits: Edits, retimed: bool) -> Placement:
     new = edits.fps or (clip.fps if retimed else None)
     offset = 0.0
     if edits.start is not None:
-        offset = edits.start - clip.start * (new or old)
+        offset = starting_at(clip, edits.start).origin.first_time_code - clip.start * (new or old)
     return Placement(new, offset, edits.scale, edits.up)
 
 
@@ -216,6 +228,35 @@ def _on_stage(clip: Clip, placement: Placement) -> Clip:
         time_codes_per_frame=per_second / clip.fps,
     )
     return scaled(replace(clip, origin=origin), placement.scale)
+
+
+def _character(path: Path, reading: Reading) -> tuple[Clip, tuple[Problem, ...]]:
+    """Read a character that gets fingers; of several animations it takes none."""
+    names = animation_names(path)
+    if len(names) < 2 or reading.animation is not None:
+        return read_any(path, reading=reading)[0], ()
+    message = f"{path.name} has {len(names)} animations: its body stays at the bind pose"
+    return read_character(path, reading=reading), (Problem("several-animations", message),)
+
+
+def _left_out(hands: Clip, body: Clip, conventions: Conventions | None) -> tuple[Problem, ...]:
+    """Say what a character does not get, or loses, when it takes the fingers of a clip."""
+    found = []
+    theirs, own = (find_hands(clip, conventions).frames for clip in (hands, body))
+    for side in SIDES:
+        if (side in theirs) != (side in own):
+            without = body if side in theirs else hands
+            message = f"{without.name} has no {side} hand, so that one gets no fingers"
+            found.append(Problem("no-common-hand", message))
+    longer = body.duration - hands.duration
+    if len(body) > 1 and abs(longer) > 1.5 / hands.fps:
+        what = "is cut" if longer > 0 else "holds its last pose"
+        message = (
+            f"the result has the time of the hands: the body's motion {what} for the last "
+            f"{abs(longer):.2f} s"
+        )
+        found.append(Problem("other-length", message))
+    return tuple(found)
 
 
 def _hips(clip: Clip, conventions: Conventions | None) -> int:

@@ -120,7 +120,7 @@ def sides(choice: str) -> tuple[Any, ...]:
 def say(text: str, quiet: bool) -> None:
     """Print for people."""
     if not quiet:
-        click.echo(text)
+        click.echo(text.encode("utf-8", "backslashreplace").decode("utf-8"))
 
 
 def warn(text: str, quiet: bool = False) -> None:

@@ -77,9 +77,7 @@ def _span(_: click.Context, __: click.Parameter, value: str | None) -> Span:
     "--to",
     "suffix",
     type=click.Choice(FORMATS),
-    default="usdc",
-    show_default=True,
-    help="Format of the files in --out-dir.",
+    help="Format of the files in --out-dir.  [default: usdc]",
 )
 @click.option(
     "--onto",
@@ -125,7 +123,7 @@ def command(
     files: tuple[str, ...],
     output: Path | None,
     out_dir: Path | None,
-    suffix: str,
+    suffix: str | None,
     onto: Path | None,
     fps: float | None,
     start: float | None,
@@ -165,6 +163,8 @@ def command(
     edits = Edits(fps, start, trim, scale, root_motion, up)
     reading = Reading(skel, animation, units, input_up)
     conventions = conventions_from(maps)
+    if onto_skel is not None and onto is None:
+        raise UsageError("--onto-skel chooses a skeleton of --onto CHARACTER, which is not given.")
     paths = find_files(files)
     jobs, code = _jobs(paths, reading, output, out_dir, suffix, force)
     check_report(report, force)
@@ -201,7 +201,7 @@ def _jobs(
     reading: Reading,
     output: Path | None,
     out_dir: Path | None,
-    suffix: str,
+    suffix: str | None,
     force: bool,
 ) -> tuple[list[Job], int]:
     """What to read and where to write it, and the exit code of files that cannot be read."""
@@ -211,6 +211,8 @@ def _jobs(
     if (output is None) == (out_dir is None):
         raise UsageError("Give either -o OUTPUT or --out-dir DIR.")
     if output is not None:
+        if suffix is not None and output.suffix.lower() != f".{suffix}":
+            raise UsageError(f"--to {suffix} and -o {output} contradict each other.")
         if len(paths) > 1:
             raise UsageError(f"{len(paths)} inputs need --out-dir DIR instead of -o.")
         check_output(output, paths, force, WRITABLE)
@@ -222,7 +224,8 @@ def _jobs(
     for path in paths:
         try:
             jobs += [
-                (path, own, out_dir / f"{name}.{suffix}") for name, own in _each(path, reading)
+                (path, own, out_dir / f"{name}.{suffix or 'usdc'}")
+                for name, own in _each(path, reading)
             ]
         except UsdHandError as error:
             fail(error)
@@ -319,6 +322,10 @@ def _tell(result: dict[str, Any], no_text: bool, quiet: bool) -> None:
         for problem in result["problems"]
         if problem["severity"] == "note" and problem["code"].startswith("guessed")
     ]
+    if result["renamed_joints"]:
+        lines.append(
+            f"  {result['renamed_joints']} joints have other names in USD than in the file"
+        )
     written = "nothing written (dry run)" if result["output"] is None else result["output"]
     say(
         "\n".join([*lines, f"  written to {written}" if result["output"] else f"  {written}"]),

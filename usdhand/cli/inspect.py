@@ -76,14 +76,16 @@ def command(
 def _inspect(path: Path, skel: str | None, conventions: Conventions | None) -> dict[str, Any]:
     from usdhand.api.clips import find_hands
     from usdhand.errors import HandNotFoundError
-    from usdhand.formats.files import read_any
+    from usdhand.formats.files import animation_names, read_any, read_character
     from usdhand.report.results import inspect_result
 
-    clip, animated = read_any(path, skel)
+    names = animation_names(path)
+    clip, animated = read_any(path, skel) if len(names) < 2 else (read_character(path, skel), False)
+    more = {"animations": list(names)} if len(names) > 1 else {}
     try:
-        return inspect_result(clip, find_hands(clip, conventions), animated)
+        return inspect_result(clip, find_hands(clip, conventions), animated) | more
     except HandNotFoundError as error:
-        return inspect_result(clip, None, animated) | {"hand_error": str(error)}
+        return inspect_result(clip, None, animated) | more | {"hand_error": str(error)}
 
 
 def _text(result: dict[str, Any], verbose: bool) -> str:
@@ -98,6 +100,9 @@ def _text(result: dict[str, Any], verbose: bool) -> str:
             f"  motion {result['animation']}, {result['frames']} frames at {result['fps']:g} fps, "
             f"{result['start_s']:.3f} to {result['end_s']:.3f} s"
         )
+    elif "animations" in result:
+        names = ", ".join(f"'{name}'" for name in result["animations"])
+        lines.append(f"  {len(result['animations'])} animations: {names}")
     else:
         lines.append("  no motion")
     if "hand_error" in result:

@@ -180,7 +180,11 @@ def _options(reading: Reading) -> dict[str, Any]:
 
 
 def _usd_skel(path: Path, reading: Reading) -> str | None:
-    for name, value in (("--animation", reading.animation), ("--units", reading.cm_per_unit)):
+    for name, value in (
+        ("--animation", reading.animation),
+        ("--units", reading.cm_per_unit),
+        ("--input-up", reading.up),
+    ):
         if value is not None:
             raise UsageError(f"{path}: {name} is for other formats; a USD file says this itself.")
     return reading.skel

@@ -14,3 +14,8 @@ FORMATS = {
 }
 READABLE = (*USD_SUFFIXES, *FORMATS)
 WRITABLE = (*USD_SUFFIXES, ".bvh", ".glb", ".gltf")
+
+# What to do about a file with several animations; only convert has the option.
+CHOOSE_ANIMATION = (
+    "'usdhand convert FILE --animation NAME -o OUT.usdc' takes one of them, --out-dir DIR all."
+)

@@ -11,6 +11,8 @@ from usdhand.motion.clip import Clip
 from usdhand.motion.kinematics import forward_kinematics
 
 FRAME_TOLERANCE = 1e-6  # of a frame
+LATEST_START = 1e9  # time codes; beyond, single frames are no longer told apart in a file
+SMALLEST_SCALE = 1e-6
 
 
 def trim(clip: Clip, first: float | None, last: float | None) -> Clip:
@@ -57,7 +59,15 @@ def counted_in_frames(clip: Clip) -> Clip:
 
 
 def starting_at(clip: Clip, time_code: float) -> Clip:
-    """Return the clip with its first frame at ``time_code``."""
+    """Return the clip with its first frame at ``time_code``.
+
+    Raises
+    ------
+    UsageError
+        if that is no time.
+    """
+    if not abs(time_code) <= LATEST_START:
+        raise UsageError(f"A start of {time_code:g} cannot be meant: give a time code.")
     return replace(clip, origin=replace(clip.origin, first_time_code=float(time_code)))
 
 
@@ -69,7 +79,7 @@ def scaled(clip: Clip, factor: float) -> Clip:
     UsageError
         if the factor is not a positive number.
     """
-    if not (np.isfinite(factor) and factor > 0):
+    if not SMALLEST_SCALE <= factor <= 1.0 / SMALLEST_SCALE:
         raise UsageError(f"A scale of {factor:g} cannot be meant: give a number > 0.")
     bind, rest = clip.skeleton.bind.copy(), clip.skeleton.rest.copy()
     bind[:, :3, 3] *= factor

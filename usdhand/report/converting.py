@@ -35,10 +35,15 @@ def convert_result(
             "up_axis": origin.up_axis,
         },
         "convention": _convention(clip, conventions),
-        "renamed_joints": len(clip.skeleton.originals),
+        "renamed_joints": _renamed(clip),
         "problems": problems_data(source.problems),
         "lost": problems_data(lost),
     }
+
+
+def _renamed(clip: Clip) -> int:
+    pairs = zip(clip.skeleton.originals, clip.skeleton.names, strict=False)
+    return sum(original != name for original, name in pairs)
 
 
 def _convention(clip: Clip, conventions: Conventions | None) -> str | None:

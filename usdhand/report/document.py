@@ -32,7 +32,9 @@ def document(
 
 def dumps(value: Mapping[str, Any]) -> str:
     """JSON text; numbers that JSON does not know become null."""
-    return json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False)
+    # File names need not be text: their odd bytes become escapes, which JSON has as well.
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def rounded(value: float, digits: int = 6) -> float:

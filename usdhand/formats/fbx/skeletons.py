@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.fbx.scene import Sampled, Scene
+from usdhand.formats.suffixes import CHOOSE_ANIMATION
 from usdhand.motion import Problem
 
 LIMBS = 3  # joints that a chain needs to be a limb
@@ -78,7 +79,7 @@ def find_take(scene: Scene, animation: str | None) -> Sampled:
         raise InputError(f"{scene.path}: nothing is animated{_emptiness(scene)}.")
     if animation is None and len(names) > 1:
         listed = _listed(names)
-        raise UsageError(f"{scene.path} has several animations: {listed}. Choose: --animation NAME")
+        raise UsageError(f"{scene.path} has several animations: {listed}. {CHOOSE_ANIMATION}")
     if animation is not None and animation not in names:
         raise UsageError(f"{scene.path}: no animation '{animation}'. There is {_listed(names)}.")
     if scene.sampled is None:

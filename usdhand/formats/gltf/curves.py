@@ -12,6 +12,7 @@ from usdhand.errors import InputError, UsageError
 from usdhand.formats.gltf.accessors import read_rows
 from usdhand.formats.gltf.document import Document, Element, listed, unused
 from usdhand.formats.gltf.nodes import SHORTEST
+from usdhand.formats.suffixes import CHOOSE_ANIMATION
 from usdhand.motion import Problem
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
@@ -80,9 +81,7 @@ def choose(path: Path, names: dict[int, str], animation: str | None) -> int:
     labels = listed(tuple(names.values()))
     if animation is None:
         if len(names) > 1:
-            raise UsageError(
-                f"{path}: has {len(names)} animations: {labels}. Choose one with --animation NAME."
-            )
+            raise UsageError(f"{path}: has {len(names)} animations: {labels}. {CHOOSE_ANIMATION}")
         return next(iter(names))
     for i, name in names.items():
         if name == animation:
