@@ -10,7 +10,7 @@ gesture has the same angles on both hands.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from usdhand.anatomy.angles import (
     euler_angles,
     from_euler,
     from_swing_twist,
-    inverse,
     product,
     same_signs,
     swing_twist_angles,
@@ -26,8 +25,9 @@ from usdhand.anatomy.angles import (
 from usdhand.anatomy.fingertips import fingertips
 from usdhand.anatomy.frames import HandFrames, hand_frames
 from usdhand.anatomy.hand import SIDE_PREFIX, SIDES, CharacterMap, Side
+from usdhand.anatomy.local_motion import LocalMotion
 from usdhand.errors import UsageError
-from usdhand.motion import Clip, forward_kinematics
+from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
@@ -95,38 +95,70 @@ def encode(clip: Clip, frames: HandFrames) -> Channels:
     """
     rows = np.empty((3 * len(frames.names), len(clip)))
     to_frames = _frame_matrices(frames)
-    foreign = _foreign(clip, frames)
-    for i, (name, joint) in enumerate(zip(frames.names, frames.joints, strict=True)):
-        local = clip.rotations[:, joint].T
-        if i in foreign:
-            local = product(inverse(foreign[i]), local)
+    for i, (name, turn) in enumerate(zip(frames.names, turns(clip, frames), strict=True)):
         take_apart = swing_twist_angles if _is_ball(name) else euler_angles
-        angles = take_apart(to_frames[i] @ local)
+        angles = take_apart(to_frames[i] @ turn)
         rows[3 * i : 3 * i + 3] = (angles * _mirror(frames))[_letters(name)]
     return Channels(all_channels(frames.side, frames.names), rows.T)
 
 
-def local_rotations(channels: Channels, clip: Clip, frames: HandFrames) -> dict[int, Array]:
-    """Rotations (4, frames) that all channels of a hand give to its joints in the skeleton.
+def turns(clip: Clip, frames: HandFrames) -> list[Array]:
+    """Rotation (4, frames) of every joint of a hand from the joint that it is measured from."""
+    motion = LocalMotion(clip)
+    pairs = zip(frames.joints, frames.references, strict=True)
+    return [motion.turn(int(joint), int(reference)) for joint, reference in pairs]
+
+
+def local_motion(channels: Channels, clip: Clip, frames: HandFrames) -> LocalMotion:
+    """The clip with the local transforms that all channels of a hand give to its joints.
 
     The clip gives the motion of what lies between a digit and the wrist where it does not hang
     off it.
     """
     rows = channels.select(all_channels(frames.side, frames.names)).values.T
     to_frames = _frame_matrices(frames)
-    foreign = _foreign(clip, frames)
-    found = {}
+    wanted = {}
     for i, (name, joint) in enumerate(zip(frames.names, frames.joints, strict=True)):
         angles = np.empty((3, rows.shape[1]))
         angles[_letters(name)] = rows[3 * i : 3 * i + 3]
         put_together = from_swing_twist if _is_ball(name) else from_euler
-        local = to_frames[i].T @ put_together(angles * _mirror(frames))
-        found[int(joint)] = product(foreign[i], local) if i in foreign else local
-    return found
+        wanted[int(joint)] = to_frames[i].T @ put_together(angles * _mirror(frames))
+    return _posed(clip, clip, frames, wanted)
+
+
+def following(before: Clip, after: Clip, frames: HandFrames) -> Clip:
+    """``after``, whose wrist moves differently, with what does not hang off it carried along.
+
+    Only the joints of a flat hand follow (see `HandFrames.followers`).
+    """
+    return _with(after, [_posed(before, after, frames, {})]) if frames.links.followers else after
+
+
+def _posed(
+    before: Clip, after: Clip, frames: HandFrames, wanted: Mapping[int, Array]
+) -> LocalMotion:
+    """``after`` with the joints of a hand turned as wanted, else as they are in ``before``.
+
+    From the wrist outwards, as followers move with joints that have moved already: turned from
+    their reference, and as far from it as they were.
+    """
+    old, new = LocalMotion(before), LocalMotion(after)
+    for joint, reference in frames.links.joints:
+        parent = int(after.skeleton.parents[joint])
+        turn = wanted[joint] if joint in wanted else old.turn(joint, reference)
+        if parent != reference:
+            turn = product(new.between(parent, reference), turn)
+        if joint in frames.links.followers:
+            offset = old.carried(old.translation(joint), parent, reference)
+            new.translations[joint] = new.carried(offset, reference, parent)
+        new.rotations[joint] = turn
+    return new
 
 
 def decode(channels: Channels, clip: Clip, frames: HandFrames) -> Clip:
-    """Put channel angles on a clip's hand; all other joints keep their rotations.
+    """Put channel angles on a clip's hand; all other joints keep their transforms.
+
+    Followers (see `HandLinks`) get new translations as well.
 
     Parameters
     ----------
@@ -145,11 +177,20 @@ def _decode(channels: Channels, clip: Clip, hands: Iterable[HandFrames]) -> Clip
         raise UsageError(
             f"Channels of {len(channels.values)} frames do not fit a clip of {len(clip)}."
         )
-    rotations = clip.rotations.copy()
-    for frames in hands:
-        for joint, q in local_rotations(channels, clip, frames).items():
+    return _with(clip, [local_motion(channels, clip, frames) for frames in hands])
+
+
+def _with(clip: Clip, motions: Sequence[LocalMotion]) -> Clip:
+    """The clip with the local transforms that motions of it have in place of its own."""
+    rotations, translations = clip.rotations.copy(), clip.translations
+    if any(motion.translations for motion in motions):
+        translations = translations.copy()
+    for motion in motions:
+        for joint, q in motion.rotations.items():
             rotations[:, joint] = same_signs(q).T
-    return clip.with_rotations(rotations)
+        for joint, t in motion.translations.items():
+            translations[:, joint] = t.T
+    return replace(clip, rotations=rotations, translations=translations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +258,7 @@ class Hands:
                     clip,
                     self.character.hands[side],
                     frames,
-                    local_rotations(channels, clip, frames) if channels else None,
+                    local_motion(channels, clip, frames) if channels else None,
                 )
                 for side, frames in self.frames.items()
             ],
@@ -230,21 +271,6 @@ def _frame_matrices(frames: HandFrames) -> Array:
     units = np.eye(4)[None]  # the products of the four unit quaternions are the columns
     before, after = rot.conjugate(frames.reference_frames)[:, None], frames.joint_frames[:, None]
     return np.swapaxes(rot.multiply(rot.multiply(before, units), after), 1, 2)
-
-
-def _foreign(clip: Clip, frames: HandFrames) -> dict[int, Array]:
-    """Rotation from parent to reference joint, (4, frames), of digits not below the wrist."""
-    parents = clip.skeleton.parents[frames.joints]
-    found = {}
-    for i in np.flatnonzero(parents != frames.references):
-        pair = [int(parents[i]), int(frames.references[i])]
-        if pair[0] < 0:  # the digit hangs off nothing: its parent is the world
-            found[int(i)] = forward_kinematics(clip, pair[1:]).rotations[:, 0].T
-            continue
-        base = clip.skeleton.common_ancestor(pair)
-        parent, reference = np.moveaxis(forward_kinematics(clip, pair, base).rotations, 1, 0)
-        found[int(i)] = rot.multiply(rot.conjugate(parent), reference).T
-    return found
 
 
 def _is_ball(joint: str) -> bool:

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.anatomy.hand import DIGITS, FINGERS, HAND_JOINTS, HandMap, Side, digit_joints
+from usdhand.anatomy.links import HandLinks, Link, hand_links
+from usdhand.anatomy.local_motion import LocalMotion
 from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
@@ -40,12 +42,13 @@ class HandFrames:
     ----------
     names : hand joints in anatomical order, those that the rig has
     joints : (n,) their indices in the skeleton
-    references : (n,) the joint that each rotation is measured from: the parent, or the wrist for
-        a digit that does not hang off it
+    references : (n,) the joint that each rotation is measured from: the parent, or where the rig
+        has something else there, the joint before it in its digit, its metacarpal or the wrist
     reference_frames : (n, 4) the frame of zero rotation, in the reference joint's axes
     joint_frames : (n, 4) the bone's frame, in its own axes
     palm : (4,) frame of the palm, in the wrist joint's axes
     tips : (digits, 3) position of each digit's tip in the axes of its last joint, cm
+    links : what moves with the channels, and what must be moved along
     notes : what geometry could not decide, in words
     """
 
@@ -57,6 +60,7 @@ class HandFrames:
     joint_frames: Array
     palm: Array
     tips: Array
+    links: HandLinks
     notes: tuple[str, ...] = ()
 
     @property
@@ -82,12 +86,15 @@ def hand_frames(skeleton: Skeleton, hand: HandMap, *clips: Clip) -> HandFrames:
     Raises
     ------
     HandNotFoundError
-        if joints that should be apart lie on one spot, so that there are no directions.
+        if joints that should be apart lie on one spot, so that there are no directions, or the
+        joints of a flat rig hang off each other in another order than that of a hand.
     """
     palm = _Palm.of(skeleton, hand)
     names = tuple(n for n in HAND_JOINTS if n in hand.joints)
     notes: list[str] = []
-    reference_frames, joint_frames, references, tips = [], [], [], []
+    reference_frames, joint_frames, tips = [], [], []
+    links = hand_links(skeleton, hand)
+    reference_of = dict(links.joints)
     for digit in DIGITS:
         chain = [digit + j for j in digit_joints(digit) if digit + j in hand.joints]
         if not chain:
@@ -97,16 +104,13 @@ def hand_frames(skeleton: Skeleton, hand: HandMap, *clips: Clip) -> HandFrames:
         for name, start, end in zip(chain, points[:-1], points[1:], strict=True):
             j = hand.joints[name]
             bone = _direction(skeleton, j, end - start)
-            first = name == chain[0]
+            first, reference = name == chain[0], reference_of[j]
             if digit == "Thumb" and not first and palm.is_normal(bone):
-                above, note = _flexing_as_it_moves(skeleton, j, bone, above, clips)
+                above, note = _flexing_as_it_moves(skeleton, (j, reference), bone, above, clips)
                 notes.append(f"{hand.side} {name}: {note}")
             own = _swung(above, bone) if digit == "Thumb" and first else _bent(above, bone)
-            parent = int(skeleton.parents[j])
-            reference = hand.wrist if first and not _below(skeleton, j, hand.wrist) else parent
             reference_frames.append(skeleton.bind_rotations[reference].T @ above)
             joint_frames.append(skeleton.bind_rotations[j].T @ own)
-            references.append(reference)
             above = own
         last = hand.joints[chain[-1]]
         tips.append(skeleton.bind_rotations[last].T @ (tip - skeleton.bind_positions[last]))
@@ -114,11 +118,12 @@ def hand_frames(skeleton: Skeleton, hand: HandMap, *clips: Clip) -> HandFrames:
         hand.side,
         names,
         np.array([hand.joints[n] for n in names], dtype=np.intp),
-        np.array(references, dtype=np.intp),
+        np.array([reference_of[hand.joints[n]] for n in names], dtype=np.intp),
         rot.from_matrix(np.array(reference_frames)),
         rot.from_matrix(np.array(joint_frames)),
         rot.from_matrix(skeleton.bind_rotations[hand.wrist].T @ palm.frame(palm.forward)),
         np.array(tips),
+        links,
         tuple(notes),
     )
 
@@ -198,7 +203,7 @@ def _about(axis: int, radians: float) -> Array:
 
 
 def _flexing_as_it_moves(
-    skeleton: Skeleton, joint: int, bone: Array, above: Array, clips: Sequence[Clip]
+    skeleton: Skeleton, link: Link, bone: Array, above: Array, clips: Sequence[Clip]
 ) -> tuple[Array, str]:
     """Frame of the bone before a joint, turned to the principal axis of the joint's motion.
 
@@ -207,14 +212,12 @@ def _flexing_as_it_moves(
     """
     unknown = "geometry does not tell its flexion axis; taken from"
     kept = above, f"{unknown} the bone before it"
-    rotations = [c.rotations[:, joint] for c in clips]
+    rotations = [LocalMotion(c).turn(*link).T for c in clips]
     if sum(map(len, rotations)) < 2:
         return kept
     together = np.concatenate(rotations)
     away = rot.multiply(together, rot.conjugate(rot.mean(together)))
-    parent = int(skeleton.parents[joint])
-    to_world = skeleton.bind_rotations[parent] if parent >= 0 else np.eye(3)
-    turns = rot.to_rotation_vector(away) @ to_world.T
+    turns = rot.to_rotation_vector(away) @ skeleton.bind_rotations[link[1]].T
     z = _unit(bone)
     turns = turns - np.outer(turns @ z, z)
     axis = np.linalg.eigh(turns.T @ turns)[1][:, -1]
@@ -246,10 +249,6 @@ def _direction(skeleton: Skeleton, joint: int, bone: Array) -> Array:
             "the bind pose, so its bone has no direction. The bind transforms are probably missing."
         )
     return bone
-
-
-def _below(skeleton: Skeleton, joint: int, ancestor: int) -> bool:
-    return ancestor in skeleton.ancestors(joint)
 
 
 def _unit(v: Array) -> Array:

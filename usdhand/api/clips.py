@@ -67,7 +67,7 @@ def write_clip(
         if the output is refused or cannot be written.
     """
     character = reopened(clip)
-    changed = [int(j) for f in find_hands(clip, conventions).frames.values() for j in f.joints]
+    changed = [j for f in find_hands(clip, conventions).frames.values() for j in f.links.moving]
     write_motion(
         character, clip, changed, Path(output), flatten=flatten, force=force, inputs=inputs
     )

@@ -99,7 +99,7 @@ def write_spliced(
     clip = spliced.clip
     character = reopened(clip)
     hands = find_hands(clip, conventions, list(spliced.hands))
-    changed = [int(j) for frames in hands.frames.values() for j in frames.joints]
+    changed = [j for frames in hands.frames.values() for j in frames.links.moving]
     if wrist:
         changed += [hands.character.hands[side].wrist for side in spliced.hands]
     write_motion(

@@ -111,6 +111,8 @@ def fill(
         for name, joint in zip(hands.frames[side].names, hands.frames[side].joints, strict=True)
         if name in joints[side]
     ]
+    followers = {j for side in wanted for j in hands.frames[side].links.followers}
+    changed += sorted(followers - {*changed})
     clips = []
     for number in range(max(len(done.alternatives) for done in filled)):
         values = channels.values.copy()
@@ -118,9 +120,9 @@ def fill(
             alternative = done.alternatives[min(number, len(done.alternatives) - 1)]
             values[:, [column[n] for n in alternative.names]] = alternative.curves
         rotations = body.rotations.copy()  # all other joints to the bit
-        made = hands.decode(Channels(channels.names, values), body).rotations
-        rotations[:, changed] = made[:, changed]
-        clips.append(body.with_rotations(rotations))
+        made = hands.decode(Channels(channels.names, values), body)
+        rotations[:, changed] = made.rotations[:, changed]
+        clips.append(made.with_rotations(rotations))
     missing = {s: tuple(j for j in hands.frames[s].names if j not in joints[s]) for s in wanted}
     return Filled(
         tuple(clips),

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from usdhand.anatomy import Channels, Hands, Side, fingertips
-from usdhand.anatomy.channels import all_channels
+from usdhand.anatomy.channels import all_channels, turns
 from usdhand.fill.assemble import Piece, join
 from usdhand.fill.candidates import Candidate, SearchSpace, finger_curves, finger_sources
 from usdhand.fill.library import MotionLibrary, Part
@@ -123,10 +123,9 @@ def _error(
     frames, hand = hands.frames[side], hands.character.hands[side]
     only = replace(hands, frames={side: frames})
     other = only.decode(only.encode(clip).replaced(Channels(names, np.array(curves))), clip)
-    joints = [
-        j for n, j in zip(frames.names, frames.joints, strict=True) if _channel(side, n) in names
-    ]
-    angle = rot.angle_between(clip.rotations[:, joints], other.rotations[:, joints])
+    joints = [i for i, n in enumerate(frames.names) if _channel(side, n) in names]
+    true, made = (np.stack(turns(c, frames), axis=1)[:, joints].T for c in (clip, other))
+    angle = rot.angle_between(true, made)
     apart = fingertips(other, hand, frames) - fingertips(clip, hand, frames)
     jerk = np.diff(curves, n=3, axis=0) * clip.fps**3
     return HandError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from usdhand.anatomy import Channels, HandFrames, Hands, Side
-from usdhand.anatomy.channels import decode, encode
+from usdhand.anatomy.channels import decode, encode, following
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate, interpolate_rotations
@@ -63,7 +63,7 @@ def with_wrist(
     rotations[:, wrist] = rot.make_continuous(
         rot.multiply(rot.conjugate(pose.rotation(parent)), world)
     )
-    return body.with_rotations(rotations)
+    return following(body, body.with_rotations(rotations), hands.frames[side])
 
 
 def forearm_frame(skeleton: Skeleton, hands: Hands, side: Side) -> Array:

@@ -94,7 +94,7 @@ def write_rig(
     write_motion(
         character,
         reduction.motion,
-        [int(j) for f in frames for j in f.joints],
+        [j for f in frames for j in f.links.moving],
         output,
         flatten=flatten,
         force=force,
