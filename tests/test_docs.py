@@ -51,9 +51,16 @@ def test_the_reference_names_no_option_that_is_not_there() -> None:
 
 
 def shown_commands(page: Path) -> list[str]:
-    blocks = re.findall(r"```(?:sh|bash)\n(.*?)```", page.read_text(encoding="utf-8"), re.S)
-    lines = [line.split(" #")[0].strip() for block in blocks for line in block.splitlines()]
-    return [line for line in lines if line.startswith("usdhand ")]
+    """Commands of `sh` blocks, and whole `python` blocks, in the order of the page."""
+    text = page.read_text(encoding="utf-8")
+    found = []
+    for language, block in re.findall(r"```(sh|bash|python)\n(.*?)```", text, re.S):
+        if language == "python":
+            found.append(block)
+            continue
+        lines = [line.split(" #")[0].strip() for line in block.splitlines()]
+        found += [line for line in lines if line.startswith("usdhand ")]
+    return found
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if shown_commands(p)], ids=lambda p: p.name)
@@ -65,6 +72,9 @@ def test_every_shown_command_runs(
     monkeypatch.chdir(tmp_path)
     for line in shown_commands(page):
         with subtests.test(line):
+            if not line.startswith("usdhand "):
+                exec(compile(line, page.name, "exec"), {})
+                continue
             result = CliRunner().invoke(main, shlex.split(line)[1:])
             assert result.exit_code == 0, result.output
 
@@ -83,7 +93,9 @@ def test_links_between_pages_lead_somewhere() -> None:
 def test_files_that_pages_name_are_there() -> None:
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
-        for name in re.findall(r"`((?:usdhand|tests|benchmarks|docs|samples|schemas)/[\w/.-]+)`", text):
+        for name in re.findall(
+            r"`((?:usdhand|tests|benchmarks|docs|samples|schemas)/[\w/.-]+)`", text
+        ):
             assert (REPOSITORY / name).exists(), f"{page.name}: {name}"
 
 
