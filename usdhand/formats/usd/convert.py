@@ -19,6 +19,7 @@ from usdhand.formats.usd.stage import Character, bound_animation, find_skeletons
 from usdhand.formats.usd.world import world_above
 from usdhand.formats.usd.write import (
     bind_animation,
+    check_name,
     copy_blend_shapes,
     extend_time,
     free_child,
@@ -27,7 +28,7 @@ from usdhand.formats.usd.write import (
     save_layer,
     stage_files,
 )
-from usdhand.motion import Clip
+from usdhand.motion import Clip, Problem
 from usdhand.motion.rotations import Array
 
 # Problems of a clip whose animation is written again to mend them.
@@ -84,17 +85,23 @@ def write_placed(
     edited: bool,
     force: bool = False,
     inputs: Sequence[Path] = (),
-) -> None:
+) -> tuple[Problem, ...]:
     """Write one file with all of a character's stage, its motion being ``clip`` if ``edited``.
 
     Joint names become legal and poses that are missing are written. The stage's own motion is kept
-    as it is where it is whole.
+    as it is where it is whole, with all of its variants.
+
+    Returns
+    -------
+    tuple of Problem
+        what one file could not keep, and where files are that were inside packages.
 
     Raises
     ------
     OutputError
         if the output is refused or cannot be written; nothing is left behind then.
     """
+    check_name(output)
     check_output(
         output, [character.path, *stage_files(character.stage), *inputs], force, USD_SUFFIXES
     )
@@ -102,12 +109,58 @@ def write_placed(
     with Sdf.ChangeBlock():
         for path in instances_above(character):
             Sdf.CreatePrimInLayer(layer, path).SetInfo("instanceable", False)
+    lost: tuple[Problem, ...] = ()
     if edited or any(problem.code in MENDED for problem in clip.problems):
         changed = range(len(clip.skeleton)) if edited else ()
+        variants = motion_variants(character)
         with Sdf.ChangeBlock():
-            _author_motion(layer, character, clip, changed)
+            _author_motion(layer, character, clip, changed, variants)
+        lost = tuple(_one_motion(*place) for place in variants)
     _mend_skeleton(layer, character, clip)
-    save_layer(layer, output, flatten=True)
+    return (*lost, *save_layer(layer, output, flatten=True))
+
+
+def motion_variants(character: Character) -> list[tuple[Sdf.Path, str, str]]:
+    """Prims, variant sets and selections on which a character's motion depends."""
+    stage = Usd.Stage.Open(character.stage.GetRootLayer())  # with a session layer of its own
+    stage.SetEditTarget(stage.GetSessionLayer())
+    own = character.skeleton.GetPath()
+    paths = set(own.GetPrefixes())
+    if character.animation is not None:
+        paths |= set(character.animation.GetPath().GetPrefixes())
+    found = []
+    for path in sorted(paths):
+        sets = stage.GetPrimAtPath(path).GetVariantSets()
+        for name in sets.GetNames():
+            selected, selection = _opinions(stage, own), sets.GetVariantSelection(name)
+            for other in sets.GetVariantSet(name).GetVariantNames():
+                sets.SetSelection(name, other)
+                if _opinions(stage, own) != selected:
+                    found.append((path, name, selection))
+                    break
+            stage.GetSessionLayer().Clear()
+    return found
+
+
+def _opinions(stage: Usd.Stage, skeleton: Sdf.Path) -> list[tuple[str, str]]:
+    """Where the motion of a skeleton is authored: layers and paths in them."""
+    prim = stage.GetPrimAtPath(skeleton)
+    animation = bound_animation(prim) if prim else None
+    if animation is None:
+        return []
+    return [
+        (spec.layer.identifier, str(spec.path))
+        for attribute in animation.GetAttributes()
+        for spec in attribute.GetPropertyStack()
+    ]
+
+
+def _one_motion(path: Sdf.Path, name: str, selection: str) -> Problem:
+    message = (
+        f"the motion is written anew, and as variant '{selection}' of '{name}' has it only; "
+        "convert without other options to keep all variants"
+    )
+    return Problem("variants", message, str(path))
 
 
 def _turn_and_scale(stage: Usd.Stage, placement: Placement) -> None:
@@ -136,7 +189,11 @@ def _turn_and_scale(stage: Usd.Stage, placement: Placement) -> None:
 
 
 def _author_motion(
-    layer: Sdf.Layer, character: Character, clip: Clip, changed: Sequence[int]
+    layer: Sdf.Layer,
+    character: Character,
+    clip: Clip,
+    changed: Sequence[int],
+    variants: Sequence[tuple[Sdf.Path, str, str]],
 ) -> None:
     source = character.animation
     shared = [s for s in find_skeletons(character.stage) if bound_animation(s) == source]
@@ -145,7 +202,11 @@ def _author_motion(
     else:
         path = free_child(character.stage, character.root.GetPath(), "Motion")
     times = author_animation(layer, path, character, clip, changed)
-    if source is None or path != source.GetPath():
+    # What is authored here wins over variants: those of an animation would be without effect.
+    own = [name for place, name, _ in variants if place == path]
+    if own:
+        layer.GetPrimAtPath(path).variantSetNameList.deletedItems = own
+    if source is None or path != source.GetPath() or variants:
         if source is not None:
             copy_blend_shapes(layer, path, UsdSkel.Animation(source))
         bind_animation(layer, character, path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -76,6 +77,8 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     InputError
         if there is no such file, or USD cannot read it.
     """
+    if not is_text(path):
+        raise InputError(f"{readable(path)}: this name is no valid text (UTF-8); USD needs one.")
     if not path.exists():
         raise InputError(f"{path}: no such file.")
     if path.is_dir():
@@ -100,6 +103,20 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     if not problems:
         problems = [Problem("usd", _first_line(message)) for message in messages]
     return stage, tuple(problems)
+
+
+def is_text(path: Path) -> bool:
+    """Whether a path can be handed to USD: its bytes are UTF-8."""
+    try:
+        str(path.absolute()).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def readable(path: Path) -> str:
+    r"""Return a path for people, its bytes that are no text as ``\xff``."""
+    return os.fsencode(path).decode(errors="backslashreplace")
 
 
 def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +16,25 @@ from usdhand.errors import InputError, OutputError, UsdHandError
 from usdhand.formats.output import check_output, written_beside
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.animation import author_animation, author_variants
+from usdhand.formats.usd.flatten import flat_layer
 from usdhand.formats.usd.stage import (
     Character,
     binding_prim,
     find_skeletons,
+    is_text,
     open_stage,
+    readable,
+    usd_diagnostics,
 )
-from usdhand.motion import Clip
+from usdhand.formats.usd.textures import (
+    copies_of,
+    copy_files,
+    is_packed,
+    is_udim,
+    modify_paths,
+    unpacked_beside,
+)
+from usdhand.motion import Clip, Problem
 
 ANIMATION_NAME = "HandMotion"
 # Fields of a root layer that are about the layer itself; all others describe the stage.
@@ -47,7 +61,7 @@ def write_motion(
     inputs: Sequence[Path] = (),
     variants: Mapping[str, Clip] | None = None,
     author: Callable[[Sdf.Layer, Sdf.Path], None] | None = None,
-) -> None:
+) -> tuple[Problem, ...]:
     """Write a character with new motion as a layer over its input.
 
     Parameters
@@ -59,11 +73,17 @@ def write_motion(
         selected, instead of ``clip`` alone
     author : adds opinions to the new layer; gets it and the path of the character's root prim
 
+    Returns
+    -------
+    tuple of Problem
+        what flattening could not keep, and where files are that were inside packages.
+
     Raises
     ------
     OutputError
         if the output is refused or cannot be written; nothing is left behind then.
     """
+    check_name(output)
     check_output(output, [*stage_files(character.stage), *inputs], force, USD_SUFFIXES)
     for motion in (clip, *(variants or {}).values()):
         if not np.isfinite(motion.rotations).all():
@@ -84,65 +104,80 @@ def write_motion(
         extend_time(layer, times)
         if author is not None:
             author(layer, root)
-    save_layer(layer, output, flatten=flatten)
+    return save_layer(layer, output, flatten=flatten)
 
 
-def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> None:
-    """Save a layer to ``output``: written beside, opened once to see that it holds, then moved."""
-    with written_beside(output) as temporary:
+def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> tuple[Problem, ...]:
+    """Save a layer to ``output``: written beside, opened once to see that it holds, then moved.
+
+    Returns what flattening could not keep, and where files are that were inside packages.
+    """
+    check_name(output)
+    problems: tuple[Problem, ...] = ()
+    with ExitStack() as undone, written_beside(output) as temporary:
         if output.suffix.lower() == ".usdz":
-            _package(layer, temporary, output)
+            problems = _package(layer, temporary, output)
+        elif flatten:
+            flat, problems = _flattened(layer, output)
+            problems += undone.enter_context(unpacked_beside(flat, output))
+            _make_relative(flat, output)
+            _export(flat, temporary)
         else:
-            _export(_flattened(layer, output) if flatten else layer, temporary)
+            _export(layer, temporary)
         _verify(temporary)
     loaded = Sdf.Layer.Find(str(output.absolute()))
     if loaded:
         loaded.Reload(force=True)
+    return problems
 
 
-def _flattened(layer: Sdf.Layer, output: Path) -> Sdf.Layer:
-    """Return one layer for all that ``layer`` is over, with paths as seen from ``output``."""
+def check_name(output: Path) -> None:
+    """Refuse a path that is no text, which USD cannot write.
+
+    Raises
+    ------
+    OutputError
+        if its bytes are no UTF-8.
+    """
+    if not is_text(output):
+        raise OutputError(f"{readable(output)}: this name is no valid text (UTF-8); USD needs one.")
+
+
+def _flattened(layer: Sdf.Layer, output: Path) -> tuple[Sdf.Layer, tuple[Problem, ...]]:
+    """Return one layer for all that ``layer`` is over, and what it cannot keep."""
     beside = output.with_name(f".{output.stem}.{os.getpid()}.layer.usdc")
     try:
         _export(layer, beside)
-        stage = Usd.Stage.Open(str(beside))
-        flat = stage.Flatten(addSourceFileComment=False)
-        _keep_variants(layer, flat)
-        del stage
+        return flat_layer(Usd.Stage.Open(str(beside)))
     finally:
         beside.unlink(missing_ok=True)
 
-    def relative(asset: str) -> str:
-        return _relative(Path(asset), output) if Path(asset).is_absolute() else asset
 
-    # Flatten makes all paths absolute, and files that move together would lose each other.
-    UsdUtils.ModifyAssetPaths(flat, relative)
-    return flat
+def _make_relative(flat: Sdf.Layer, output: Path) -> None:
+    """Give a layer paths as seen from ``output``.
 
-
-def _keep_variants(layer: Sdf.Layer, flat: Sdf.Layer) -> None:
-    """Put animations that have variants in ``layer`` into what was flattened, which has none."""
-    found: list[Sdf.Path] = []
-
-    def visit(path: Sdf.Path) -> None:
-        prim = layer.GetPrimAtPath(path) if path.IsPrimPath() else None
-        if prim and prim.typeName == "SkelAnimation" and len(prim.variantSets):
-            found.append(path)
-
-    layer.Traverse(Sdf.Path.absoluteRootPath, visit)
-    for path in found:
-        Sdf.CopySpec(layer, path, flat, path)
+    Flattening makes all paths absolute, and files that move together would lose each other.
+    """
+    modify_paths(
+        flat, lambda asset: _relative(Path(asset), output) if Path(asset).is_absolute() else asset
+    )
 
 
-def _package(layer: Sdf.Layer, temporary: Path, output: Path) -> None:
-    flat = output.with_name(f".{output.stem}.{os.getpid()}.flat.usdc")
-    try:
-        _export(_flattened(layer, output), flat)
+def _package(layer: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, ...]:
+    flat, problems = _flattened(layer, output)
+    with TemporaryDirectory(prefix=f".{output.stem}.", dir=output.absolute().parent) as folder:
+        # USD packs UDIM tiles only where they are below the layer, and packages as a whole.
+        copies = copies_of(flat, lambda asset: is_udim(asset) or is_packed(asset))
+        copy_files(flat, copies, Path(folder, "textures"))
+        path = Path(folder, "flat.usdc")
+        _make_relative(flat, path)
+        _export(flat, path)
         name = f"{output.stem}.usdc"
-        if not UsdUtils.CreateNewUsdzPackage(str(flat), str(temporary), name):
+        with usd_diagnostics() as messages:
+            done = UsdUtils.CreateNewUsdzPackage(str(path), str(temporary), name)
+        if not done:
             raise OutputError(f"{output}: USD could not make the .usdz package.")
-    finally:
-        flat.unlink(missing_ok=True)
+    return (*problems, *(Problem("usd", message) for message in messages))
 
 
 def stage_files(stage: Usd.Stage) -> list[Path]:

@@ -1,0 +1,158 @@
+"""Files that a layer refers to inside packages, and UDIM tiles, as files of their own."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Ar, Sdf, UsdShade, UsdUtils
+
+from usdhand.formats.usd.stage import usd_diagnostics
+from usdhand.motion import Problem
+
+
+@dataclass(frozen=True)
+class Copies:
+    """Files to copy.
+
+    Attributes
+    ----------
+    files : name of a copy -> path of its source, which may be inside a package
+    renamed : asset path in the layer -> name of its copy, with ``<UDIM>`` for the tile
+    """
+
+    files: dict[str, str]
+    renamed: dict[str, str]
+
+
+def is_udim(asset: str) -> bool:
+    """Whether an asset path stands for the tiles of a UDIM texture."""
+    return bool(UsdShade.UdimUtils.IsUdimIdentifier(asset))
+
+
+def is_packed(asset: str) -> bool:
+    """Whether an asset path leads into a package."""
+    return bool(Ar.IsPackageRelativePath(asset))
+
+
+def modify_paths(layer: Sdf.Layer, change: Callable[[str], str]) -> None:
+    """Change all asset paths of a layer."""
+    with usd_diagnostics():  # UDIM tiles inside packages are no reason to print
+        UsdUtils.ModifyAssetPaths(layer, change)
+
+
+def copies_of(layer: Sdf.Layer, wanted: Callable[[str], bool]) -> Copies:
+    """Plan copies of the files that ``layer`` refers to and ``wanted`` is true of.
+
+    Files that are not there stay as they are.
+    """
+    found: dict[str, None] = {}
+
+    def note(asset: str) -> str:
+        if wanted(asset):
+            found[asset] = None
+        return asset
+
+    modify_paths(layer, note)
+    copies = Copies({}, {})
+    for asset in found:
+        sources = _sources(layer, asset)
+        plain = _inner_name(asset)
+        for number in itertools.count(1):
+            name = plain if number == 1 else f"{number}_{plain}"
+            files = {name.replace("<UDIM>", tile): path for path, tile in sources}
+            if not copies.files.keys() & files.keys():
+                break
+        if files:
+            copies.files.update(files)
+            copies.renamed[asset] = name
+    return copies
+
+
+def copy_files(layer: Sdf.Layer, copies: Copies, folder: Path) -> None:
+    """Copy files that are not there yet to a folder, and let the layer refer to them."""
+    if copies.files:
+        folder.mkdir(exist_ok=True)
+    for name, source in copies.files.items():
+        target = folder / name
+        if not target.exists():
+            target.write_bytes(_read(source))
+    renamed = {asset: (folder / name).as_posix() for asset, name in copies.renamed.items()}
+    modify_paths(layer, lambda asset: renamed.get(asset, asset))
+
+
+@contextmanager
+def unpacked_beside(layer: Sdf.Layer, output: Path) -> Iterator[tuple[Problem, ...]]:
+    """Copy what ``layer`` refers to inside packages to a folder beside ``output``.
+
+    No file is replaced: a folder that has other files of these names is left alone, and another
+    one made. All is taken back if the block ends with an error.
+    """
+    copies = copies_of(layer, is_packed)
+    if not copies.files:
+        yield ()
+        return
+    folder = _folder(output.absolute(), copies)
+    was_there = folder.exists()
+    before = set(folder.iterdir()) if was_there else set()
+    try:
+        copy_files(layer, copies, folder)
+        packages = sorted({Path(asset.split("[")[0]).name for asset in copies.renamed})
+        message = f"the textures inside {', '.join(packages)} are copied to {folder.name}"
+        yield (Problem("textures", message, severity="note"),)
+    except BaseException:
+        for name in copies.files:
+            if folder / name not in before:
+                (folder / name).unlink(missing_ok=True)
+        if not was_there and folder.exists():
+            folder.rmdir()
+        raise
+
+
+def _folder(output: Path, copies: Copies) -> Path:
+    """Return the first folder beside ``output`` that has no other files of these names."""
+
+    def fits(folder: Path) -> bool:
+        targets = [(folder / name, source) for name, source in copies.files.items()]
+        return not folder.exists() or (
+            folder.is_dir()
+            and all(not t.exists() or t.read_bytes() == _read(source) for t, source in targets)
+        )
+
+    names = (f"{output.stem}_textures{n if n > 1 else ''}" for n in itertools.count(1))
+    return next(folder for name in names if fits(folder := output.with_name(name)))
+
+
+def _sources(layer: Sdf.Layer, asset: str) -> list[tuple[str, str]]:
+    """Files that an asset path stands for, each with its tile."""
+    if is_udim(asset):
+        with usd_diagnostics():
+            return list(UsdShade.UdimUtils.ResolveUdimTilePaths(asset, layer))
+    there = Ar.GetResolver().Resolve(asset)
+    return [(asset, "")] if there else []
+
+
+def _inner_name(asset: str) -> str:
+    while is_packed(asset):
+        asset = Ar.SplitPackageRelativePathOuter(asset)[1]
+    return asset.rsplit("/", 1)[-1]
+
+
+def _read(path: str) -> bytes:
+    """Read a file, or one inside a package (inside a package ...)."""
+    if not is_packed(path):
+        return Path(path).read_bytes()
+    outer, inner = Ar.SplitPackageRelativePathOuter(path)
+    data: Path | io.BytesIO = Path(outer)
+    while True:
+        name, rest = Ar.SplitPackageRelativePathOuter(inner) if is_packed(inner) else (inner, "")
+        with zipfile.ZipFile(data) as package:
+            content = package.read(name)
+        if not rest:
+            return content
+        data, inner = io.BytesIO(content), rest
