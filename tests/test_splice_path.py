@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle_2006 import algorithm_1, best_turn, distance_of_signs
 from scipy.spatial.transform import Rotation
 
-from usdhand.alignment.phase_dtw import phase_path, sign_costs, signs_along, turn_angles
+from usdhand.alignment.phase_dtw import NEVER, phase_path, sign_costs, signs_along, turn_angles
 from usdhand.errors import UsageError
+from usdhand.splice import SpliceSettings
 from usdhand.splice.band import Pin, anchors_of, band_along, checked_pins, pinned_band
 from usdhand.splice.markers import Markers
+from usdhand.splice.method import align
 from usdhand.splice.phases import smoothed
 from usdhand.splice.refine import refined
 from usdhand.splice.warps import EXACT, stiff, through_pins
@@ -200,8 +202,67 @@ def test_every_row_of_a_band_can_be_reached(problem) -> None:
     assert (band.low[1:] <= band.high[:-1] + 1).all()
     assert band.low[0] == 0
     assert band.high[-1] == m - 1
-    near = band_along(np.linspace(0, m - 1, n), band, 1e9)
-    assert near.cells == band.cells
+    anywhere = np.linspace(0, m - 1, n).astype(int)
+    assert band_along(anywhere, anywhere, band, 1e9).cells == band.cells
+
+
+def test_the_way_stays_open_beside_rows_of_many_columns() -> None:
+    """Where the body waits, one row of a path can be wider than the band near it."""
+    whole = pinned_band(((0, 0, 0), (9, 199, 0)), 200.0)
+    first, last = np.array([0, 1, 2, 3, 4, 195, 196, 197, 198, 199]), np.arange(10)
+    last[4], last[5:] = 194, first[5:]
+    near = band_along(first, last, whole, 5.0)
+    p, q = np.zeros((2, 10), np.uint64), np.zeros((1, 2, 200), np.uint64)
+    begin, end, cost = phase_path(p, q, *NO_TURN, near.low, near.high)
+    assert (near.low <= first).all()
+    assert (near.high >= last).all()
+    assert cost == 0
+    assert (begin[0], end[-1]) == (0, 199)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [
+        ([0, 3, 4], [1, 4, 5]),  # columns 2 is left out
+        ([0, 2, 1], [2, 3, 5]),
+        ([0, 1, 2], [4, 3, 5]),
+        ([0, 3, 4], [5, 2, 5]),
+        ([-1, 0, 0], [5, 5, 5]),
+        ([0, 0, 0], [5, 5, 6]),
+        ([0, 0], [5, 5]),
+    ],
+)
+def test_a_band_without_a_way_through_is_refused(low: list[int], high: list[int]) -> None:
+    p, q = np.zeros((2, 3), np.uint64), np.zeros((1, 2, 6), np.uint64)
+    with pytest.raises(ValueError, match="no way through"):
+        phase_path(p, q, *NO_TURN, np.array(low), np.array(high))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(20, 400), st.integers(20, 400), st.floats(0.01, 1.0))
+def test_all_passes_get_through_whatever_the_pins(
+    seed: int, rows: int, columns: int, width: float
+) -> None:
+    """Pins and holds anywhere: no pass runs a band without a way (it would be refused)."""
+    random = np.random.default_rng(seed)
+    count = int(random.integers(0, 6))
+    at = [np.sort(random.integers(0, n, count)) / 60.0 for n in (rows, columns)]
+    slack = random.choice([0.0, 0.1, 1.0], count)
+    pins = [Pin(b, h, t) for b, h, t in zip(*at, slack, strict=True)]
+    holding = np.minimum(np.arange(columns), random.integers(1, columns)) / 60.0
+    hand = moving_hand(holding)
+    body = moving_hand(np.arange(rows) / 60.0)
+    pins = checked_pins(one_a_frame(pins), "left", (rows - 1) / 60.0, (columns - 1) / 60.0)
+    times = np.arange(rows) / 60.0
+    second, first, cost = align(body, hand, SpliceSettings(band=(width, 0.01)), pins, times)
+    assert cost < NEVER
+    for warp in (first, second):
+        assert (np.diff(warp) >= 0).all()
+        assert all(abs(np.interp(p.body, times, warp) - p.hand) < p.tolerance + 1e-6 for p in pins)
+
+
+def one_a_frame(pins: list[Pin]) -> list[Pin]:
+    return list({p.body: p for p in pins}.values())
 
 
 def test_pins_on_the_first_and_last_frame_move_the_ends() -> None:

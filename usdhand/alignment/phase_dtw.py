@@ -46,14 +46,21 @@ def phase_path(
     body_windows : (row blocks, 2, n) level coordinates x, z of the markers around the middle of
         every `BLOCK` rows, less their mean
     hand_windows : (2, n, column blocks) likewise
-    low, high : (rows,) bounds of the band; there must be a way through it
+    low, high : (rows,) bounds of the band
 
     Returns
     -------
     first, last : (rows,) columns of the path in every row
     cost : sum over the path
+
+    Raises
+    ------
+    ValueError
+        if there is no way through the band, or it leaves the matrix.
     """
     rows, columns = body.shape[1], hand.shape[2]
+    if not _passable(low, high, rows, columns):
+        raise ValueError("there is no way through the band")
     starts = np.zeros(rows + 1, np.int64)
     for i in range(rows):
         starts[i + 1] = starts[i] + (high[i] - low[i]) // 4 + 1
@@ -77,6 +84,21 @@ def phase_path(
         above, here = here, above
     begin, end_ = _way_back(moves, starts, low, high)
     return begin, end_, above[high[rows - 1] + 1]
+
+
+@kernel
+def _passable(low: Ints, high: Ints, rows: int, columns: int) -> bool:
+    """Whether a path that never goes back gets through a band."""
+    if len(low) != rows or len(high) != rows or low[0] < 0 or high[-1] >= columns:
+        return False
+    for i in range(rows):
+        if low[i] > high[i]:
+            return False
+        if i > 0 and not low[i - 1] <= low[i] <= high[i - 1] + 1:
+            return False
+        if i > 0 and high[i] < high[i - 1]:
+            return False
+    return True
 
 
 def turn_angles(count: int) -> Doubles:

@@ -126,10 +126,16 @@ def pinned_band(anchors: Sequence[Anchor], width: float) -> Band:
     return _steady(low, high, anchors[0][1], anchors[-1][1])
 
 
-def band_along(path: Array, band: Band, reach: float) -> Band:
-    """The part of a band that is within ``reach`` columns of a path (rows,)."""
-    low = np.maximum(band.low, np.floor(path - reach).astype(np.int64))
-    high = np.minimum(band.high, np.ceil(path + reach).astype(np.int64))
+def band_along(first: NDArray[np.int64], last: NDArray[np.int64], band: Band, reach: float) -> Band:
+    """The part of a band that is within ``reach`` columns of a path through it.
+
+    Parameters
+    ----------
+    first, last : (rows,) columns of the path in every row; all of them stay, so that there is
+        a way through, however many columns a row has
+    """
+    low = np.maximum(band.low, np.floor(first - reach).astype(np.int64))
+    high = np.minimum(band.high, np.ceil(last + reach).astype(np.int64))
     return Band(low, high)
 
 

@@ -191,7 +191,7 @@ def align(
     reach = min(settings.band[1] * len(body), MOST_BAND_S * settings.fps)
     reach = max(reach, settings.least_band * settings.fps) / 2
     if settings.align == "local":
-        near = band_along(path.middle, band, reach)
+        near = band_along(path.first, path.last, band, reach)
         path = steadied(body, hand, path, near, *signs, settings.directions)
     own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps
     room = _room(own_times, pins)
