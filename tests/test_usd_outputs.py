@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import stages
+from cli_runner import run
 from pxr import Usd
 from rewriting import HAND, payload, plain, rewrite
 
@@ -75,6 +76,22 @@ def test_relative_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.chdir(tmp_path)
     meant, found = rewrite(Path("in.usdc"), Path("out.usdc"))
     assert np.abs(found.rotations - meant.rotations).max() < 1e-6
+
+
+@pytest.mark.skipif(os.name == "nt", reason="names are text there")
+@pytest.mark.parametrize("suffix", [".usda", ".usdz"])
+def test_names_that_are_no_text_are_refused(suffix: str, tmp_path: Path) -> None:
+    odd = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff"))
+    path = plain(tmp_path)
+    refused(path, odd.with_suffix(suffix), r"\\xff\.usd.: this name is no valid text", flatten=True)
+    output = odd.with_suffix(suffix)
+    result = run("convert", path, "-o", output, code=2)
+    assert r"\xff.usd" in result.output
+    path = path.rename(odd.with_suffix(".usdc"))
+    for verb in (["inspect"], ["check"], ["convert", "-o", tmp_path / "out.usda"]):
+        result = run(*verb, path, code=3)
+        assert r"\xff.usdc: this name is no valid text" in result.output.replace("\n", "")
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_further_inputs_are_safe_too(tmp_path: Path) -> None:

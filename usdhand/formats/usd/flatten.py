@@ -110,8 +110,8 @@ class _Embedding:
         if arc.assetPath not in self.classes and not self._embed(arc.assetPath):
             return None  # a file that is missing adds nothing to the stage either
         root, own_rate, default = self.classes[arc.assetPath]
-        target = arc.primPath or (Sdf.Path.absoluteRootPath.AppendPath(default) if default else "")
-        if not target:
+        target = arc.primPath or Sdf.Path(f"/{default}" if default else "")
+        if target.isEmpty:
             return None
         # Between files USD counts time codes anew; within one it does not.
         offset = arc.layerOffset

@@ -46,21 +46,25 @@ def modify_paths(layer: Sdf.Layer, change: Callable[[str], str]) -> None:
         UsdUtils.ModifyAssetPaths(layer, change)
 
 
+def asset_paths(layer: Sdf.Layer) -> list[str]:
+    """All asset paths of a layer, each once."""
+    found: dict[str, None] = {}
+
+    def note(asset: str) -> str:
+        found[asset] = None
+        return asset
+
+    modify_paths(layer, note)
+    return list(found)
+
+
 def copies_of(layer: Sdf.Layer, wanted: Callable[[str], bool]) -> Copies:
     """Plan copies of the files that ``layer`` refers to and ``wanted`` is true of.
 
     Files that are not there stay as they are.
     """
-    found: dict[str, None] = {}
-
-    def note(asset: str) -> str:
-        if wanted(asset):
-            found[asset] = None
-        return asset
-
-    modify_paths(layer, note)
     copies = Copies({}, {})
-    for asset in found:
+    for asset in filter(wanted, asset_paths(layer)):
         sources = _sources(layer, asset)
         plain = _inner_name(asset)
         for number in itertools.count(1):
@@ -72,6 +76,11 @@ def copies_of(layer: Sdf.Layer, wanted: Callable[[str], bool]) -> Copies:
             copies.files.update(files)
             copies.renamed[asset] = name
     return copies
+
+
+def missing_files(layer: Sdf.Layer) -> list[str]:
+    """Absolute asset paths of a layer that lead nowhere."""
+    return [a for a in asset_paths(layer) if Path(a).is_absolute() and not _sources(layer, a)]
 
 
 def copy_files(layer: Sdf.Layer, copies: Copies, folder: Path) -> None:

@@ -31,6 +31,7 @@ from usdhand.formats.usd.textures import (
     copy_files,
     is_packed,
     is_udim,
+    missing_files,
     modify_paths,
     unpacked_beside,
 )
@@ -170,13 +171,15 @@ def _package(layer: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, 
         copies = copies_of(flat, lambda asset: is_udim(asset) or is_packed(asset))
         copy_files(flat, copies, Path(folder, "textures"))
         path = Path(folder, "flat.usdc")
+        missing = missing_files(flat)
         _make_relative(flat, path)
         _export(flat, path)
         name = f"{output.stem}.usdc"
         with usd_diagnostics() as messages:
             done = UsdUtils.CreateNewUsdzPackage(str(path), str(temporary), name)
         if not done:
-            raise OutputError(f"{output}: USD could not make the .usdz package.")
+            reason = f"; not found: {', '.join(missing)}" if missing else ""
+            raise OutputError(f"{output}: USD could not make the .usdz package{reason}.")
     return (*problems, *(Problem("usd", message) for message in messages))
 
 
