@@ -19,11 +19,12 @@ from usdhand.anatomy.frames import hand_frames
 from usdhand.anatomy.hand import DIGITS, SIDES, CharacterMap, HandMap
 from usdhand.api import find_hands, read_clip
 from usdhand.api.converting import retarget_hands, write_new
-from usdhand.errors import HandNotFoundError
+from usdhand.errors import HandNotFoundError, UsageError
 from usdhand.formats.files import read_any
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.splice.merge import with_wrist
 
 SAMPLES = REPOSITORY / "samples"
 TALK = SAMPLES / "conversations" / "talk_02_full.usdc"
@@ -166,13 +167,13 @@ def test_a_turned_wrist_takes_a_flat_hand_along(role: str | None) -> None:
     bones, flat = pair(all_on(role))
     turn = rot.from_axis_angle(np.array([0.0, 0.6, 0.8]), np.linspace(0, 1, FRAMES))
 
-    def with_wrist(clip: Clip) -> Clip:
+    def turned(clip: Clip) -> Clip:
         q = clip.rotations.copy()
         wrist = INDEX["left", "wrist"]
         q[:, wrist] = rot.multiply(q[:, wrist], turn)
         return following(clip, clip.with_rotations(q), hands_of(clip).frames["left"])
 
-    assert_same_world(with_wrist(bones), with_wrist(flat))
+    assert_same_world(turned(bones), turned(flat))
 
 
 def test_a_thumb_that_hangs_off_the_arm_as_a_whole_stays_there() -> None:
@@ -264,6 +265,16 @@ def test_a_flat_take_gives_its_motion_to_others(tmp_path: Path) -> None:
     ben, _ = read_any(SAMPLES / "characters" / "ben.usdc")
     ours, theirs = retarget_hands(flat, ben), retarget_hands(read_clip(TALK), ben)
     assert rot.angle_between(ours.rotations, theirs.rotations).max() < 0.05
+
+
+def test_a_wrist_without_a_forearm_is_not_spliced() -> None:
+    clip = moved(RIG, INDEX, random_turns(FRAMES, 5))
+    hand = MAPS["left"]
+    roots = reparented(clip, {hand.wrist: -1} | all_on(None)(RIG, hand))
+    warp = np.arange(FRAMES) / clip.fps
+    for body, other in ((roots, clip), (clip, roots)):
+        with pytest.raises(UsageError, match=r"left wrist.*no forearm"):
+            with_wrist(body, other, hands_of(body), hands_of(other), "left", warp)
 
 
 def turned_since_the_start(clip: Clip, hand: HandMap) -> dict[str, Array]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from usdhand.anatomy import Channels, HandFrames, Hands, Side
 from usdhand.anatomy.channels import decode, encode, following
+from usdhand.errors import UsageError
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate, interpolate_rotations
@@ -47,7 +48,20 @@ def with_fingers(
 def with_wrist(
     body: Clip, hand_clip: Clip, hands: Hands, hand_hands: Hands, side: Side, warp: Array
 ) -> Clip:
-    """The body with the hand clip's rotation of the palm relative to the forearm."""
+    """The body with the hand clip's rotation of the palm relative to the forearm.
+
+    Raises
+    ------
+    UsageError
+        if a clip has no joint above the wrist, so that nothing tells how the wrist bends.
+    """
+    for clip, own in ((body, hands), (hand_clip, hand_hands)):
+        wrist = own.character.hands[side].wrist
+        if clip.skeleton.parents[wrist] < 0:
+            raise UsageError(
+                f"{clip.name}: the {side} wrist, '{clip.skeleton.joints[wrist]}', hangs off no "
+                "forearm, so nothing tells how it bends. Splice the fingers alone (--wrist body)."
+            )
     bends = _palm_to_forearm(hand_clip, hand_hands, side)
     times = _times_within(warp) * hand_clip.fps
     taken = rot.mean(np.stack([interpolate_rotations(bends, t) for t in times]))
