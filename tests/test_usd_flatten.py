@@ -105,8 +105,23 @@ def through_variants(folder: Path) -> Path:
     return path
 
 
+def leading_out(folder: Path) -> Path:
+    """An asset whose animation and shader are outside of what is referenced: they do not come."""
+    asset = with_looks(stages.character(folder / "asset.usda"))
+    stage = stages.edited(asset)
+    layer = stage.GetRootLayer()
+    Sdf.CopySpec(layer, stages.ANIMATION, layer, "/Loose")
+    stages.bind(stage.GetPrimAtPath(stages.SKELETON), "/Loose")
+    skin = stage.GetPrimAtPath("/Hero/Skin")
+    value = skin.CreateAttribute("inputs:x", Sdf.ValueTypeNames.Float)
+    value.SetConnections(["/Loose.outputs:x", "/Hero/Skel.outputs:x"])
+    stage.Save()
+    return stages.referencing(folder / "in.usda", asset)
+
+
 SOURCES: list[Callable[[Path], Path]] = [
     local, sublayered, referenced, payload, instance, selected_above, through_variants,
+    leading_out,
 ]  # fmt: skip
 
 
@@ -119,6 +134,7 @@ def composed(stage: Usd.Stage) -> dict[str, Any]:
             times = attribute.GetTimeSamples()
             values = [str(attribute.Get(t)) for t in times or [Usd.TimeCode.Default()]]
             result[str(attribute.GetPath())] = [round(t, 9) for t in times], values
+            result[f"{attribute.GetPath()} connections"] = attribute.GetConnections()
         for relationship in prim.GetRelationships():
             result[str(relationship.GetPath())] = relationship.GetForwardedTargets()
     return result

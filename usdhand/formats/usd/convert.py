@@ -156,10 +156,7 @@ def _opinions(stage: Usd.Stage, skeleton: Sdf.Path) -> list[tuple[str, str]]:
 
 
 def _one_motion(path: Sdf.Path, name: str, selection: str) -> Problem:
-    message = (
-        f"the motion is written anew, and as variant '{selection}' of '{name}' has it only; "
-        "convert without other options to keep all variants"
-    )
+    message = f"only the motion of variant '{selection}' of '{name}' is kept: it is written anew"
     return Problem("variants", message, str(path))
 
 

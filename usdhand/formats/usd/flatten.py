@@ -88,6 +88,7 @@ class _Embedding:
         # Names of the layer's own prims, which no class may take and no inherited class may have.
         self.own = {prim.name for prim in self.layer.rootPrims}
         self._lead_inside(self.layer)
+        self._drop_strays()
 
     def _lead_inside(self, layer: Sdf.Layer) -> None:
         """Let references and payloads of a layer lead to copies of their files."""
@@ -144,6 +145,25 @@ class _Embedding:
             Sdf.CopySpec(layer, source, self.layer, root.AppendChild(name))
         return True
 
+    def _drop_strays(self) -> None:
+        """Delete targets outside of what is referenced: valid in one file, not between files."""
+        roots = [root for root, _, _ in self.classes.values()]
+        strays: list[tuple[Usd.Property, list[Sdf.Path]]] = []
+        stage = Usd.Stage.Open(self.layer)
+        for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+            for prop in prim.GetAuthoredProperties():
+                related = isinstance(prop, Usd.Relationship)
+                targets = prop.GetTargets() if related else prop.GetConnections()
+                if found := [t for t in targets if any(t.HasPrefix(root) for root in roots)]:
+                    if prim.IsInstanceProxy():
+                        raise _NoEmbeddingError(f"{prop.GetPath()} leads out of its file")
+                    strays.append((prop, found))
+        for prop, found in strays:
+            spec = _local_spec(self.layer, prop)
+            related = isinstance(prop, Usd.Relationship)
+            paths = spec.targetPathList if related else spec.connectionPathList
+            paths.deletedItems = found
+
     def _free(self, asset: str) -> Sdf.Path:
         name = base = "Embedded_" + re.sub(r"\W", "_", Path(asset.split("[")[0]).stem, flags=re.A)
         number = 1
@@ -163,6 +183,16 @@ def _layer_stack(stage: Usd.Stage) -> Sdf.Layer:
             if prim.HasInfo(key):
                 raise _NoEmbeddingError(f"{prim.path} {what}")
     return layer
+
+
+def _local_spec(layer: Sdf.Layer, prop: Usd.Property) -> Sdf.PropertySpec:
+    spec = layer.GetPropertyAtPath(prop.GetPath())
+    if spec:
+        return spec
+    prim = Sdf.CreatePrimInLayer(layer, prop.GetPrimPath())
+    if isinstance(prop, Usd.Relationship):
+        return Sdf.RelationshipSpec(prim, prop.GetName(), prop.IsCustom())
+    return Sdf.AttributeSpec(prim, prop.GetName(), prop.GetTypeName(), prop.GetVariability())
 
 
 def _items(proxy: Any) -> list[Sdf.Path]:
