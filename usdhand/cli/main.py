@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import signal
-import sys
-import threading
 from typing import Any
 
 import click
@@ -30,10 +27,6 @@ VERBS = {
 }
 
 
-def _terminated(number: int, _: object) -> None:
-    sys.exit(128 + number)
-
-
 class VerbGroup(click.Group):
     """Loads verbs late, and turns our errors into one message and an exit code."""
 
@@ -56,16 +49,6 @@ class VerbGroup(click.Group):
         del ctx
         with formatter.section("Verbs"):
             formatter.write_dl(list(VERBS.items()))
-
-    def main(self, *arguments: Any, **options: Any) -> Any:
-        """Run the program; when it is told to end, temporary files are cleaned up all the same."""
-        if threading.current_thread() is not threading.main_thread():
-            return super().main(*arguments, **options)
-        before = signal.signal(signal.SIGTERM, _terminated)
-        try:
-            return super().main(*arguments, **options)
-        finally:
-            signal.signal(signal.SIGTERM, before)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a verb; what a person can mend ends in a message, not in a traceback."""

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -78,12 +81,33 @@ def _check_writable(folder: Path) -> None:
 
 @contextmanager
 def written_beside(output: Path) -> Iterator[Path]:
-    """A path in the output's folder that replaces it once the block has ended without an error."""
+    """A path in the output's folder that replaces it once the block has ended without an error.
+
+    It is cleaned up also when the program is told to end.
+    """
     temporary = output.with_name(f".{output.stem}.{os.getpid()}.tmp{output.suffix}")
     try:
-        yield temporary
+        with _ended_by_exception():
+            yield temporary
         os.replace(temporary, output)  # noqa: PTH105  (atomic on every system)
     except OSError as error:
         raise OutputError(f"{output}: cannot be written ({error.strerror or error}).") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _ended_by_exception() -> Iterator[None]:
+    """Turn SIGTERM into an exception, so that what was begun is cleaned up."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, _: object) -> None:
+        sys.exit(128 + number)
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
