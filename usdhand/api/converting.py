@@ -128,7 +128,7 @@ def convert(
         clip, edited = _on_stage(moved, placement), edits.of_frames or fingers is not None
         if not dry_run:
             character = placed(find_character(body_file, body_reading.skel), placement)
-            write_placed(character, clip, output, edited=edited, force=force, inputs=inputs)
+            lost += write_placed(character, clip, output, edited=edited, force=force, inputs=inputs)
     else:
         clip = scaled(counted_in_frames(motion(body)), edits.scale)
         if edits.start is not None:

@@ -309,7 +309,8 @@ def _tell(result: dict[str, Any], no_text: bool, quiet: bool) -> None:
         if problem["severity"] == "warning":
             warn(f"{result['path']}: {problem['message']}", quiet)
     for problem in result["lost"]:
-        warn(f"{result['output']}: {problem['message']}", quiet)
+        if problem["severity"] == "warning":
+            warn(f"{result['output']}: {problem['message']}", quiet)
     motion = (
         f"{result['frames']} frames at {result['fps']:g} fps from time code {result['start']:g}"
         if result["animated"]
@@ -317,11 +318,8 @@ def _tell(result: dict[str, Any], no_text: bool, quiet: bool) -> None:
     )
     hands = f"hands by convention '{result['convention']}'" if result["convention"] else "no hands"
     lines = [f"{result['path']}: {result['joints']} joints, {motion}; {hands}"]
-    lines += [
-        f"  {problem['message']}"
-        for problem in result["problems"]
-        if problem["severity"] == "note" and problem["code"].startswith("guessed")
-    ]
+    notes = [p for p in result["problems"] if p["code"].startswith("guessed")] + result["lost"]
+    lines += [f"  {note['message']}" for note in notes if note["severity"] == "note"]
     if result["renamed_joints"]:
         lines.append(
             f"  {result['renamed_joints']} joints have other names in USD than in the file"
