@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,7 @@ from usdhand.formats.usd.world import world_above
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.report.preview.pack import Pack
+from usdhand.report.preview.page import figure
 
 OK = GESTURES / "ok_01.usdc"
 
@@ -44,6 +47,10 @@ def test_rotations_are_as_exact_as_stated() -> None:
         for j, i in enumerate(kept)
     ]
     assert 0 < max(errors) < 0.0035
+    shown = np.stack([np.broadcast_to(rot.normalize(tables[i]), (len(clip), 4)) for i in kept], 1)
+    posed = forward_kinematics(replace(clip, rotations=rot.make_continuous(shown)))
+    added_up = rot.angle_between(posed.rotations, forward_kinematics(clip).rotations)
+    assert max(errors) < added_up.max() < 0.02
 
 
 @pytest.mark.parametrize("span", [1e-4, 1.0, 250.0, 40_000.0])
@@ -215,6 +222,43 @@ def test_digits_that_hang_off_nothing_have_curves(tmp_path: Path) -> None:
 
 
 @pytest.mark.real_data
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_digits_of_flat_rigs_have_bones(tmp_path: Path, side: str) -> None:
+    """Wrist, metacarpals, joints and tips, none of which hangs off another."""
+    file = shared_data("gltf", "webxr-generic-hand", f"{side}.glb")
+    run("preview", file, "-o", tmp_path / "hand.html")
+    [lane] = page_data(tmp_path / "hand.html")["lanes"]
+    bones = {(lane["joints"][b["joint"]], lane["joints"][b["child"]]) for b in lane["bones"]}
+    assert len(bones) == len(lane["bones"]) == 24
+    index = [f"index_finger_{x}" for x in ("metacarpal", "phalanx_proximal",
+             "phalanx_intermediate", "phalanx_distal", "tip")]  # fmt: skip
+    assert set(zip(["wrist", *index], index, strict=False)) <= bones
+    assert ("wrist", "thumb_metacarpal") in bones
+    clip = api.read_character(file)
+    at = forward_kinematics(clip).positions[0]
+    for bone in lane["bones"]:
+        assert bone["part"] == side
+        assert bone["loose"]
+        length = np.linalg.norm(at[bone["child"]] - at[bone["joint"]])
+        assert np.linalg.norm(bone["to"]) == pytest.approx(length, abs=1e-3)
+
+
+@pytest.mark.real_data
+def test_thumbs_beside_the_wrist_belong_to_the_hand(tmp_path: Path) -> None:
+    """From the wrist to the tip, though they hang off the forearm."""
+    take = shared_data("studiogalt", "full", "SG_ASL_7_2023_1_29.usdc")
+    run("preview", take, "-o", tmp_path / "real.html", "--max-points", "0", "--max-frames", "2")
+    [lane] = page_data(tmp_path / "real.html")["lanes"]
+    parts = {lane["joints"][b["child"]]: b for b in lane["bones"]}
+    for side, letter in (("left", "L"), ("right", "R")):
+        chain = [f"Thumb{i}_{letter}" for i in (1, 2, 3)] + [f"Thumb3_{letter}_end"]
+        assert [parts[name]["part"] for name in chain] == [side] * 4
+        assert [parts[name]["loose"] for name in chain] == [True, False, False, False]
+        assert lane["joints"][parts[chain[0]]["joint"]] == f"Hand_{letter}"
+        assert parts[f"Forearm_{letter}"]["part"] == parts[f"Hand_{letter}"]["part"] == "body"
+
+
+@pytest.mark.real_data
 def test_real_takes_have_bones_of_the_body_only(tmp_path: Path) -> None:
     take = sorted(shared_data("studiogalt", "full").glob("*.usdc"))[0]
     run("preview", take, "-o", tmp_path / "real.html")
@@ -234,7 +278,8 @@ def test_long_clips_are_decimated_with_a_word(tmp_path: Path) -> None:
     assert every > 3
     words = f"the page has every {every}th of {len(clip)} frames"
     assert words in done.output
-    assert any(words in note for note in lane["notes"])
+    assert any(note.startswith("long clip") and words in note for note in lane["notes"])
+    assert done.output.count("ok_01: ") == done.output.count("long clip") == 1
     assert lane["fps"] == pytest.approx(clip.fps / every)
     tables = unpacked(page_data(page))
     moving = [tables[i] for i in lane["rotations"] if len(tables[i]) > 1]
@@ -260,6 +305,55 @@ def test_segments_of_a_fill_report_are_on_the_timeline(results: Results, tmp_pat
         assert [(s["start"], s["end"], s["label"]) for s in row["spans"]] == [
             (s["start"], s["end"], s["clip"]) for s in segments
         ]
+
+
+def rows_with(report: Path, folder: Path, *files: Path) -> list[dict]:
+    run("preview", *files, "--with-report", report, "-o", folder / "rows.html", "--force",
+        "--max-points", "0")  # fmt: skip
+    return page_data(folder / "rows.html")["rows"]
+
+
+def test_rows_name_the_lane_that_they_tell_of(results: Results, tmp_path: Path) -> None:
+    """The output, wherever it stands in the order, or else the clip that was filled."""
+    body, fill = GESTURES / "ok_03.usdc", results.fill_report
+    for files, lane in (
+        ([OK, results.filled], "filled choice_1"),
+        ([body, results.filled], "filled choice_1"),
+        ([OK, body], "ok_03"),
+    ):
+        assert {r["lane"] for r in rows_with(fill, tmp_path, *files)} == {lane}
+    hands = rows_with(results.splice_report, tmp_path, GESTURES / "ok_04.usdc")
+    assert {r["lane"] for r in hands} == {"ok_04"}
+    moved = [tmp_path / p.name for p in (results.filled, results.fill_report)]
+    for old, new in zip((results.filled, results.fill_report), moved, strict=True):
+        new.write_bytes(old.read_bytes())
+    assert {r["lane"] for r in rows_with(moved[1], tmp_path, moved[0])} == {"filled choice_1"}
+
+
+def test_a_report_of_another_clip_is_refused(results: Results, tmp_path: Path) -> None:
+    page = tmp_path / "other.html"
+    for report, words in (
+        (results.fill_report, "but of filled.usda and ok_03.usdc"),
+        (results.splice_report, "but of spliced.usda and ok_03.usdc and ok_04.usdc"),
+    ):
+        done = run("preview", OK, "--with-report", report, "-o", page, code=2)
+        assert words in done.output
+    # What stands where the output was, but is as long as another clip.
+    report = json.loads(results.fill_report.read_text())
+    changed = tmp_path / "changed.json"
+    changed.write_text(json.dumps(report | {"output": str(OK), "frames": report["frames"] + 1}))
+    run("preview", OK, "--with-report", changed, "-o", page, code=2)
+    changed.write_text(json.dumps(report | {"inputs": [{"path": "x"}]}))
+    assert "not complete" in run("preview", OK, "--with-report", changed, "-o", page, code=3).output
+    assert not page.exists()
+
+
+def test_distance_and_cost_of_a_segment_are_told_apart(results: Results, tmp_path: Path) -> None:
+    """Costs are those in the plot of the graph."""
+    first = json.loads(results.fill_report.read_text())["hands"]["left"]["segments"][0]
+    detail = rows_with(results.fill_report, tmp_path, results.filled)[0]["spans"][0]["detail"]
+    assert detail.endswith(f"distance {first['cost']:.4g}, cost {first['node_cost']:.3g}")
+    assert first["cost"] != pytest.approx(first["node_cost"], rel=0.1)
 
 
 def test_a_splice_report_retimes_its_hand_clip(results: Results, tmp_path: Path) -> None:
@@ -317,16 +411,54 @@ def test_nothing_in_a_page_leads_outside(results: Results, tmp_path: Path) -> No
 
 def test_names_and_figures_cannot_become_markup(tmp_path: Path) -> None:
     evil = "</script><script>alert(1)</script>"
-    figure = tmp_path / "curve_of_index.svg"
-    figure.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{evil}</svg>')
+    picture = tmp_path / "curve_of_index.svg"
+    picture.write_text('<svg xmlns="http://www.w3.org/2000/svg"><script>alert(1)</script></svg>')
     page = tmp_path / "evil.html"
-    run("preview", OK, "-o", page, "--title", evil, "--figure", figure)
+    run("preview", OK, "-o", page, "--title", evil, "--figure", picture)
     text = page.read_text(encoding="utf-8")
     assert "alert(1)</script>" not in text
     data = page_data(page)
     assert data["title"] == evil
     assert data["figures"][0]["name"] == "curve of index"
     assert data["figures"][0]["source"].startswith("data:image/svg+xml;base64,")
+
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><path d="M0 0"/></svg>'
+PNG = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+A8AAQUBAScY42YAAAAASUVORK5CYII="
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.svg", SVG.encode(), None),
+        ("a.svg", b"\xff\xfe" + SVG.encode("utf-16-le"), None),
+        ("a.svg", SVG.encode()[:-6], "no XML"),
+        ("a.svg", b"", "no XML"),
+        ("a.svg", PNG, "no XML"),
+        ("a.svg", b'<?xml version="1.0" encoding="nonsense"?><svg/>', "no XML"),
+        ("a.svg", b"<html><svg/></html>", "its root is 'html'"),
+        ("a.svg", b"<svg/>", "its root is 'svg', not 'svg' of http://www.w3.org/2000/svg"),
+        ("a.PNG", PNG, None),
+        ("a.png", SVG.encode(), "does not begin as one"),
+        ("a.png", PNG[:20], "does not begin as one"),
+        ("a.png", PNG[:19] + b"\x07" + PNG[20:], "damaged header"),
+        ("a.png", PNG[:40], "not complete"),
+    ],
+)
+def test_figures_are_what_they_are_named(
+    tmp_path: Path, name: str, content: bytes, words: str | None
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    if words is None:
+        assert figure(path)["source"].endswith(base64.b64encode(content).decode())
+        return
+    with pytest.raises(InputError) as caught:
+        figure(path)
+    assert words in str(caught.value)
+    assert name in str(caught.value)
 
 
 def test_files_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
@@ -364,7 +496,7 @@ def test_json_tells_what_was_made(tmp_path: Path) -> None:
         (["there.html"], 2, "use --force"),
         (["ok.html", "--with-report", "report.json"], 3, "no JSON"),
         (["ok.html", "--with-report", "list.json"], 3, "no report of usdhand"),
-        (["ok.html", "--with-report", "reduce.json"], 3, "a report of 'reduce'"),
+        (["ok.html", "--with-report", "reduce.json"], 2, "a report of 'reduce'"),
         (["ok.html", "--with-report", "half.json"], 3, "not complete"),
         (["ok.html", "--with-report", "gone.json"], 3, "cannot be read"),
         (["ok.html", "--figure", "list.json"], 3, "no figure"),

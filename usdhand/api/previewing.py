@@ -16,7 +16,14 @@ from usdhand.formats.output import check_output, written_beside
 from usdhand.formats.usd.takes import Take, read_takes
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
-from usdhand.report.preview.events import read_report, report_rows, report_verb, retiming, warp_rows
+from usdhand.report.preview.events import (
+    lane_of,
+    read_report,
+    report_rows,
+    report_verb,
+    retiming,
+    warp_rows,
+)
 from usdhand.report.preview.lanes import Lane, lane_data, unshown
 from usdhand.report.preview.pack import Pack
 from usdhand.report.preview.page import figure, page
@@ -69,20 +76,21 @@ def preview_clips(
 
     Parameters
     ----------
-    reports : JSON reports of `fill` or `splice`, for the timeline; with that of a splice, its hand
-        clip plays in the time of the body
+    reports : JSON reports of `fill` or `splice`, for the timeline, of files that are shown; with
+        that of a splice, its hand clip plays in the time of the body
     figures : SVG or PNG files to show below
 
     Raises
     ------
     InputError
         if a file cannot be used.
+    UsageError
+        if a report tells of none of the files.
     """
     if not files:
         raise UsageError("There is nothing to show: give a file.")
     settings = settings or PreviewSettings()
     read = [(Path(path), read_report(Path(path))) for path in reports]
-    rows = [{**row, "source": path.name} for path, r in read for row in report_rows(r, path)]
     pictures = [figure(Path(path)) for path in figures]
     names = _names([Path(f) for f in files])
     lanes = [
@@ -90,19 +98,17 @@ def preview_clips(
         for path, name in names.items()
         for lane in _lanes(path, name, skel, settings, conventions)
     ]
+    rows = [row for path, report in read for row in _report_rows(report, path, lanes)]
     lanes = _retimed(lanes, dict(retiming(report) for _, report in read))
     if not any(report_verb(report) == "splice" for _, report in read):
         rows += [row for lane in lanes if lane.shown for row in _warp_rows(lane)]
     lanes, hidden = _few_shown(lanes)
     pack = Pack()
     made = [lane_data(lane, pack, settings.max_frames) for lane in lanes]
-    words = tuple(word for _, word in made if word)
-    notes = tuple(f"{lane.name}: {note}" for lane in lanes for note in lane.notes) + words
-    data = {"lanes": [d for d, _ in made], "rows": rows, "notes": hidden, **pack.document()}
+    notes = tuple(f"{d['name']}: {note}" for d in made for note in d["notes"])
+    data = {"lanes": made, "rows": rows, "notes": hidden, **pack.document()}
     text = page(title or _title(list(names.values())), data, pictures)
-    return Previewed(
-        text, tuple(lane.clip for lane in lanes), tuple(d for d, _ in made), (*notes, *hidden)
-    )
+    return Previewed(text, tuple(lane.clip for lane in lanes), tuple(made), (*notes, *hidden))
 
 
 def write_preview(
@@ -167,16 +173,32 @@ def _lane(
     )
 
 
+def _report_rows(
+    report: Mapping[str, Any], path: Path, lanes: Sequence[Lane]
+) -> list[dict[str, Any]]:
+    rows = report_rows(report, path)
+    lane = lane_of(report, path, lanes, _hashes(lanes))
+    return [{**row, "source": path.name, "lane": lane.name} for row in rows]
+
+
+def _hashes(lanes: Sequence[Lane]) -> list[str]:
+    return [file_hash(lane.clip.origin.path or Path()) or "" for lane in lanes]
+
+
 def _retimed(lanes: Sequence[Lane], warps: Mapping[str, Mapping[Side, Array]]) -> list[Lane]:
     """Lanes of the hand clips that were spliced play in the time of the body."""
     if not any(warps):
         return list(lanes)
-    hashes = [file_hash(lane.clip.origin.path or Path()) or "" for lane in lanes]
-    return [replace(lane, retime=warps.get(h, {})) for lane, h in zip(lanes, hashes, strict=True)]
+    return [
+        replace(lane, retime=warps.get(h, {}))
+        for lane, h in zip(lanes, _hashes(lanes), strict=True)
+    ]
 
 
 def _warp_rows(lane: Lane) -> list[dict[str, Any]]:
-    return [{**row, "source": lane.name} for row in warp_rows(lane.warps, lane.clip.fps)]
+    return [
+        {**row, "source": "", "lane": lane.name} for row in warp_rows(lane.warps, lane.clip.fps)
+    ]
 
 
 def _few_shown(lanes: Sequence[Lane]) -> tuple[list[Lane], list[str]]:

@@ -104,6 +104,8 @@ def read_rigs(path: str) -> list[HandRig]:
 
 def open_stage(path: str) -> Usd.Stage:
     """Open a stage; raises RigError if that fails."""
+    if not Path(path).is_file():
+        raise RigError(f"{path}: no such file.")
     try:
         return Usd.Stage.Open(path)
     except Tf.ErrorException as error:
@@ -121,6 +123,8 @@ def write_edits(path: str, rig_path: str, output: str, edited: Mapping[str, Chan
         raise RigError(f"{target.name}: the name must end in {', '.join(SUFFIXES)}.")
     if target in [Path(layer.realPath) for layer in stage.GetUsedLayers() if layer.realPath]:
         raise RigError(f"{target} is a part of the rig and stays as it is: choose another name.")
+    if not target.parent.is_dir():
+        raise RigError(f"{target.parent}: no such folder to write {target.name} to.")
     layer = _layer_over(stage, target)
     prim = Sdf.CreatePrimInLayer(layer, rig_path)
     for channel in edited.values():

@@ -104,7 +104,11 @@ def histograms(reductions: Sequence[Reduction]) -> Figure:
     widths.set_xlim(left=0)
     widths.locator_params(axis="y", integer=True)
     held = int((~statistics.moving(rig.range_threshold)).sum())
-    _threshold(widths, rig.range_threshold, f"below {rig.range_threshold:.3g} deg: {held} channels")
+    constant = sum(relation.kind not in ("free", "linear") for relation in rig.relations)
+    # A rig of other clips holds what did not move there.
+    does = "" if held == constant else f"\nthis rig holds {constant} constant"
+    below = f"below {rig.range_threshold:.3g} deg: {held} channels{does}"
+    _threshold(widths, rig.range_threshold, below)
     widths.set_title(f"range of {len(rig.names)} channels")
     widths.set_xlabel("range, deg")
     widths.set_ylabel("channels")

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from usdhand.anatomy import SIDES, Side
-from usdhand.errors import InputError
+from usdhand.errors import InputError, UsageError
 from usdhand.motion.rotations import Array
+
+if TYPE_CHECKING:
+    from usdhand.report.preview.lanes import Lane
 
 SHOWN_VERBS = ("fill", "splice")
 
@@ -22,7 +25,9 @@ def read_report(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        if it is none.
+        if it is no report.
+    UsageError
+        if it is one of another verb.
     """
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
@@ -32,10 +37,15 @@ def read_report(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: no JSON ({error}).") from error
     verb = report_verb(report)
     if verb not in SHOWN_VERBS:
-        kind = f"a report of '{verb}'" if verb else "no report of usdhand"
-        raise InputError(
-            f"{path}: {kind}; the timeline shows those of {' and '.join(SHOWN_VERBS)}."
-        )
+        shown = f"the timeline shows those of {' and '.join(SHOWN_VERBS)}."
+        if verb:
+            raise UsageError(f"{path}: a report of '{verb}'; {shown}")
+        raise InputError(f"{path}: no report of usdhand; {shown}")
+    inputs = report.setdefault("inputs", [])
+    if not isinstance(inputs, list) or not all(
+        isinstance(x, dict) and {"path", "sha256"} <= x.keys() for x in inputs
+    ):
+        raise InputError(f"{path}: the report is not complete (inputs).")
     return dict(report)
 
 
@@ -43,6 +53,45 @@ def report_verb(report: Any) -> str:
     """Name of the verb that wrote a report, "" if none of ours did."""
     schema = report.get("schema", "") if isinstance(report, dict) else ""
     return schema[8:].partition("/")[0] if str(schema).startswith("usdhand.") else ""
+
+
+def lane_of(
+    report: Mapping[str, Any], path: Path, lanes: Sequence[Lane], hashes: Sequence[str]
+) -> Lane:
+    """The lane that a report tells of: its output, or else its input, which has the same time.
+
+    A hand clip will do as well, since it plays in the time of the body. Of several alternatives,
+    the segments are those of the first one that was found.
+
+    Parameters
+    ----------
+    path : of the report; its output may stand beside it
+    hashes : SHA-256 of the lanes' files
+
+    Raises
+    ------
+    UsageError
+        if it tells of none of them.
+    """
+    of = report["inputs"][: 2 if report_verb(report) == "splice" else 1]
+    made = [Path(str(report["output"]))] if report.get("output") else []
+    places = {p.resolve() for m in made for p in (m, path.parent / m, path.with_name(m.name))}
+    files = [lane.clip.origin.path for lane in lanes]
+    fitting = [
+        lane
+        for lane, file in zip(lanes, files, strict=True)
+        if file and file.resolve() in places and len(lane.clip) == report.get("frames")
+    ]
+    for own in of:
+        fitting += [x for x, h in zip(lanes, hashes, strict=True) if h and h == own["sha256"]]
+    if not fitting:
+        names = dict.fromkeys(p.name for p in (*made, *(Path(str(own["path"])) for own in of)))
+        raise UsageError(
+            f"{path}: the report tells of none of the files that are shown, but of "
+            f"{' and '.join(names) or 'none at all'}."
+        )
+    alternatives = [x for x in fitting if x.clip.origin.path == fitting[0].clip.origin.path]
+    return min(alternatives, key=lambda lane: lane.alternative)
 
 
 def report_rows(report: Mapping[str, Any], path: Path) -> list[dict[str, Any]]:
@@ -64,7 +113,7 @@ def report_rows(report: Mapping[str, Any], path: Path) -> list[dict[str, Any]]:
 
 def retiming(report: Mapping[str, Any]) -> tuple[str, dict[Side, Array]]:
     """Hash of the hand clip of a splice, and its warps (n, 2) [body s, hand s]; "" for others."""
-    if report_verb(report) != "splice" or len(report.get("inputs", ())) < 2:
+    if report_verb(report) != "splice" or len(report["inputs"]) < 2:
         return "", {}
     warps = {s: np.asarray(report["hands"][s]["warp"], float) for s in report["hands"]}
     return str(report["inputs"][1]["sha256"]), {s: warps[s] for s in SIDES if s in warps}
@@ -87,7 +136,7 @@ def _fill_row(side: str, hand: Mapping[str, Any]) -> dict[str, Any]:
             "end": float(s["end"]),
             "label": str(s["clip"]),
             "detail": f"{s['clip']} {s['clip_start']:.2f} to {s['clip_end']:.2f} s, "
-            f"cost {s['cost']:.1f}",
+            f"distance {s['cost']:.4g}, cost {s['node_cost']:.3g}",
         }
         for s in hand["segments"]
     ]

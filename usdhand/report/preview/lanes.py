@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.anatomy import Hands, Side
+from usdhand.anatomy.hand import digit_joints
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion.kinematics import scaled_joints
 from usdhand.motion.rotations import Array
@@ -49,15 +51,15 @@ class Lane:
     notes: tuple[str, ...] = ()
 
 
-def lane_data(lane: Lane, pack: Pack, max_frames: int) -> tuple[dict[str, Any], str | None]:
-    """A lane as plain data, its arrays put into ``pack``, and a word if it was decimated."""
+def lane_data(lane: Lane, pack: Pack, max_frames: int) -> dict[str, Any]:
+    """A lane as plain data, its arrays put into ``pack``; a note says if it was decimated."""
     clip = lane.clip
     every = -(-len(clip) // max_frames)
     kept = slice(None, None, every)
-    word = None
+    notes = list(lane.notes)
     if every > 1:
-        word = (
-            f"{lane.name}: long clip, the page has every {_ordinal(every)} of {len(clip)} frames "
+        notes.append(
+            f"long clip, the page has every {_ordinal(every)} of {len(clip)} frames "
             f"({clip.fps / every:.3g} a second) and blends between them"
         )
     drawn = _drawn(clip.skeleton, lane.hands)
@@ -84,7 +86,7 @@ def lane_data(lane: Lane, pack: Pack, max_frames: int) -> tuple[dict[str, Any], 
         "meshes": [_mesh(skin, pack) for skin in lane.skins],
         "retime": {side: warp.round(4).tolist() for side, warp in lane.retime.items()},
         "relations": {r.name: _relation(r) for r in lane.relations},
-        "notes": [*lane.notes, *([word] if word else [])],
+        "notes": notes,
     }
     if lane.hands is not None:
         channels = lane.hands.encode(clip).select(lane.hands.model_names)
@@ -100,7 +102,7 @@ def lane_data(lane: Lane, pack: Pack, max_frames: int) -> tuple[dict[str, Any], 
             }
             for side, frames in lane.hands.frames.items()
         }
-    return data, word
+    return data
 
 
 def _joints(clip: Clip) -> range:
@@ -135,25 +137,35 @@ def _hand_length(skeleton: Skeleton, hands: Hands, side: Side) -> float:
 def _bones(
     clip: Clip, hands: Hands | None, drawn: Sequence[int], positions: Array
 ) -> list[dict[str, Any]]:
-    """Bones from a joint to a point in its axes: {joint, to, radius, part}."""
+    """Bones from a joint to a point in its axes: {joint, to, radius, part, child, loose}.
+
+    Loose ones end wherever their child is, which does not hang off the joint; of ``to`` only the
+    length is theirs.
+    """
     skeleton = clip.skeleton
     offsets = clip.translations.mean(axis=0)
-    own = _hand_joints(skeleton, hands)
+    own, along = _hand_joints(skeleton, hands), _along_digits(skeleton, hands)
     tall = float(np.ptp(positions[:, drawn, 1].mean(axis=0))) or 1.0
     bones = []
     for child in drawn:
-        parent, length = int(skeleton.parents[child]), float(np.linalg.norm(offsets[child]))
+        loose = child in along
+        parent = along.get(child, int(skeleton.parents[child]))
+        apart = np.linalg.norm(positions[:, child] - positions[:, parent], axis=1).mean()
+        offset = np.array([0.0, apart, 0.0]) if loose else offsets[child]
+        length = float(np.linalg.norm(offset))
         if parent not in drawn or length < 1e-3 * min(tall, 100.0):
             continue
         part, radius = own.get(child, ("body", 0.0))
         if part == "body":
             share, least, most = BODY_RADIUS_SHARE
             radius = float(np.clip(share * length, least, most)) * min(tall / 150.0, 1.0)
-        bones.append(_bone(parent, offsets[child], radius, part, child))
+        bones.append(_bone(parent, offset, radius, part, child) | {"loose": loose})
+    starts = {bone["joint"] for bone in bones}
     for side, frames in (hands.frames if hands else {}).items():
         size = _hand_length(skeleton, hands, side) / HAND_LENGTH if hands else 1.0
         for digit, tip in zip(frames.digits, frames.tips, strict=True):
-            if not skeleton.children[last := frames.last_joint(digit)]:
+            last = frames.last_joint(digit)
+            if not skeleton.children[last] and last not in starts:
                 bones.append(_bone(last, tip, FINGER_RADIUS * size, side, last))
     return bones
 
@@ -165,11 +177,12 @@ def _bone(joint: int, to: Array, radius: float, part: str, child: int) -> dict[s
         "radius": round(radius, 4),
         "part": part,
         "child": child,
+        "loose": False,
     }
 
 
 def _hand_joints(skeleton: Skeleton, hands: Hands | None) -> dict[int, tuple[str, float]]:
-    """Joints below a wrist -> side and radius of the bone that leads to them."""
+    """Joints of the hands and all below them -> side and radius of the bone that leads there."""
     found: dict[int, tuple[str, float]] = {}
     for side in hands.frames if hands else ():
         assert hands is not None
@@ -177,10 +190,27 @@ def _hand_joints(skeleton: Skeleton, hands: Hands | None) -> dict[int, tuple[str
         size = _hand_length(skeleton, hands, side) / HAND_LENGTH
         firsts = {j for n, j in own.joints.items() if n.endswith("MCP") and "Thumb" not in n}
         palm = {*firsts, *own.metacarpals.values(), own.joints.get("ThumbCMC", -1)}
+        parts = {*own.joints.values(), *own.metacarpals.values(), *own.tips.values()}
         for joint in range(len(skeleton)):
-            if own.wrist in skeleton.ancestors(joint) or joint in own.joints.values():
+            if joint in parts or not {own.wrist, *parts}.isdisjoint(skeleton.ancestors(joint)):
                 radius = PALM_RADIUS if joint in palm else FINGER_RADIUS
                 found[joint] = (side, radius * size)
+    return found
+
+
+def _along_digits(skeleton: Skeleton, hands: Hands | None) -> dict[int, int]:
+    """Joints of digits -> the one before, the wrist for the first, where they hang off another."""
+    found: dict[int, int] = {}
+    for own in hands.character.hands.values() if hands else ():
+        for digit in own.digits:
+            joints = [
+                j for n in digit_joints(digit) if (j := own.joints.get(digit + n)) is not None
+            ]
+            before = [own.metacarpals[digit]] if digit in own.metacarpals else []
+            after = [own.tips[digit]] if digit in own.tips else []
+            for above, joint in pairwise([own.wrist, *before, *joints, *after]):
+                if above not in skeleton.ancestors(joint):
+                    found[joint] = above
     return found
 
 
@@ -192,7 +222,9 @@ def _drawn(skeleton: Skeleton, hands: Hands | None) -> tuple[int, ...]:
     if hands is None:
         return tuple(range(len(skeleton)))
     hips = hands.character.hips
-    own = [m.wrist for m in hands.character.hands.values()] + ([] if hips is None else [hips])
+    own = [] if hips is None else [hips]
+    for hand in hands.character.hands.values():
+        own += [hand.wrist, *hand.joints.values(), *hand.metacarpals.values(), *hand.tips.values()]
     above = set() if hips is None else set(skeleton.ancestors(hips))
     roots = {(joint, *skeleton.ancestors(joint))[-1] for joint in own}
     return tuple(

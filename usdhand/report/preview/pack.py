@@ -1,8 +1,8 @@
 """Arrays for the page: quantised, differenced, deflated and each one stored once.
 
 Motion becomes 16-bit numbers. Quaternions have a step of 1/32767, so that no joint turns by more
-than 0.0035 degrees away from its clip; what has a range of its own (translations, angles) has steps
-of a 65534th of it.
+than 0.0035 degrees away from its clip, relative to its parent; what has a range of its own
+(translations, angles) has steps of a 65534th of it.
 """
 
 from __future__ import annotations

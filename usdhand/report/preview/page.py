@@ -5,16 +5,21 @@ from __future__ import annotations
 import base64
 import html
 import json
+import struct
+import zlib
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
+from xml.etree import ElementTree
 
 from usdhand.errors import InputError
 from usdhand.version import __version__
 
 FIGURE_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
+SVG_ROOT = "{http://www.w3.org/2000/svg}svg"  # without its namespace, no browser shows it
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 # Modules by the names that they import each other by. The three.js files are as their authors
 # released them; see viewer/THREE-LICENSE.txt.
 MODULES = {
@@ -63,7 +68,7 @@ def figure(path: Path) -> dict[str, str]:
     Raises
     ------
     InputError
-        if it is no SVG or PNG file.
+        if it is no SVG or PNG file, or one that no browser shows.
     """
     kind = FIGURE_TYPES.get(path.suffix.lower())
     if kind is None:
@@ -72,8 +77,35 @@ def figure(path: Path) -> dict[str, str]:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    wrong = _wrong_svg(content) if kind == FIGURE_TYPES[".svg"] else _wrong_png(content)
+    if wrong:
+        raise InputError(f"{path}: {wrong}.")
     source = f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
     return {"name": path.stem.replace("_", " "), "source": source}
+
+
+def _wrong_svg(content: bytes) -> str:
+    """What is wrong with an SVG, "" for nothing."""
+    try:
+        root = ElementTree.fromstring(content)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        return f"no SVG, since it is no XML ({error})"
+    if root.tag != SVG_ROOT:
+        return f"no SVG, since its root is '{root.tag}', not 'svg' of {SVG_ROOT[1:-4]}"
+    return ""
+
+
+def _wrong_png(content: bytes) -> str:
+    """What is wrong with the header of a PNG, "" for nothing."""
+    header = content[12:29]  # "IHDR" and its fields
+    if not content.startswith(PNG_SIGNATURE) or header[:4] != b"IHDR" or len(content) < 33:
+        return "no PNG, since it does not begin as one"
+    width, height = struct.unpack(">II", header[4:12])
+    if zlib.crc32(header) != int.from_bytes(content[29:33], "big") or not width or not height:
+        return "a PNG with a damaged header"
+    if b"IDAT" not in content or b"IEND" not in content[-12:]:
+        return "a PNG that is not complete"
+    return ""
 
 
 def _module(file: str) -> str:

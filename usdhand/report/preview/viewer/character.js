@@ -93,8 +93,8 @@ export class Character {
       new THREE.Quaternion().setFromUnitVectors(UP, new THREE.Vector3(...to).normalize());
     const shape = (bone, at, [x, y, z]) =>
       new THREE.Matrix4().compose(new THREE.Vector3(...at), turn(bone), new THREE.Vector3(x, y, z));
-    const ball = (bone, at, r) =>
-      ({ joint: bone.joint, part: bone.part, shape: shape(bone, at, [r, r, r]) });
+    const ball = (bone, at, r, joint = bone.joint) =>
+      ({ joint, part: bone.part, shape: shape(bone, at, [r, r, r]) });
     this.shapes = bones.map((bone) =>
       shape(bone, [0, 0, 0], [bone.radius, Math.hypot(...bone.to), bone.radius]));
     // A ball where a bone begins, and one where it ends if no larger one begins there.
@@ -102,7 +102,8 @@ export class Character {
       const next = bone.child === bone.joint ? 0 : (starts.get(bone.child) ?? 0);
       const ends = next < THIN * bone.radius;
       const start = ball(bone, [0, 0, 0], bone.radius);
-      return ends ? [start, ball(bone, bone.to, THIN * bone.radius)] : [start];
+      const end = bone.loose ? [[0, 0, 0], THIN * bone.radius, bone.child] : [bone.to, THIN * bone.radius];
+      return ends ? [start, ball(bone, ...end)] : [start];
     });
     const material = () => new THREE.MeshLambertMaterial();
     this.sticks = new THREE.InstancedMesh(stick, material(), bones.length);
@@ -114,8 +115,11 @@ export class Character {
   }
 
   #placeBones() {
-    this.lane.bones.forEach(({ joint }, i) =>
-      this.sticks.setMatrixAt(i, matrix.multiplyMatrices(this.world[joint], this.shapes[i])));
+    this.lane.bones.forEach((bone, i) => {
+      if (bone.loose) stretched(matrix, this.world[bone.joint], this.world[bone.child], bone.radius);
+      else matrix.multiplyMatrices(this.world[bone.joint], this.shapes[i]);
+      this.sticks.setMatrixAt(i, matrix);
+    });
     this.balls.forEach(({ joint, shape }, i) =>
       this.knobs.setMatrixAt(i, matrix.multiplyMatrices(this.world[joint], shape)));
     this.sticks.instanceMatrix.needsUpdate = true;
@@ -187,6 +191,15 @@ function lights() {
   const back = new THREE.DirectionalLight(0xffffff, 0.8);
   back.position.set(-0.6, 0.4, -1);
   return [new THREE.HemisphereLight(0xffffff, 0x777788, 1.6), sun, back];
+}
+
+/** The matrix of a stick from one joint to another that does not hang off it. */
+function stretched(out, from, to, radius) {
+  const start = new THREE.Vector3().setFromMatrixPosition(from);
+  const along = new THREE.Vector3().setFromMatrixPosition(to).sub(start);
+  const length = along.length();
+  const turn = new THREE.Quaternion().setFromUnitVectors(UP, along.normalize());
+  out.compose(start, turn, new THREE.Vector3(radius, length, radius));
 }
 
 /** The matrix of a rotation that need not be of unit length, a translation and scales. */

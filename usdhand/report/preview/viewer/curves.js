@@ -1,7 +1,7 @@
 // Curves of the channels of one digit, a row a channel, a line a lane.
 
 import { element, find, style } from 'dom';
-import { laneTime } from 'playback';
+import { laneEnded, laneTime } from 'playback';
 
 const DIGITS = ['Thumb', 'Index', 'Middle', 'Ring', 'Pinky'];
 const AXES = { x: 'abduction', y: 'flexion', z: 'twist' };
@@ -133,6 +133,7 @@ export class Curves {
         const frame = laneTime(lane, this.playback.time, side) * lane.fps;
         const text = tables[i].at(frame, [0])[0].toFixed(1);
         value.textContent = `${text === '-0.0' ? '0.0' : text}°`;
+        value.classList.toggle('ended', laneEnded(lane, this.playback.time, side));
       });
     }
   }

@@ -18,6 +18,7 @@ export function bindKeys(bindings, list, enabled) {
   }
   document.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || !enabled()) return;
+    if (event.key === 'Escape') event.target.blur();
     if (event.target.closest(TYPED_INTO)) return;
     if (event.key === ' ' && event.target.closest(CLICKABLE)) return;
     if (event.target.matches('input[type=radio]') && event.key.startsWith('Arrow')) return;
@@ -33,6 +34,7 @@ const NAMES = {
   ' ': 'space',
   ArrowLeft: '←',
   ArrowRight: '→',
+  Escape: 'Esc',
   'Shift+ArrowLeft': 'shift ←',
   'Shift+ArrowRight': 'shift →',
 };

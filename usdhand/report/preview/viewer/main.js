@@ -2,7 +2,7 @@
 
 import { unpack } from 'data';
 import { element, find, pressed, style } from 'dom';
-import { laneTime, Playback, SPEEDS } from 'playback';
+import { laneEnded, laneTime, Playback, SPEEDS } from 'playback';
 import { Timeline } from 'timeline';
 import { Curves } from 'curves';
 import { bindKeys } from 'keys';
@@ -31,6 +31,7 @@ async function openStage() {
     return new Stage(find('view'), characters, () => { stale = true; });
   } catch (error) {
     find('trouble').hidden = false;
+    document.documentElement.dataset.stage = 'none';
     find('trouble').textContent = `The 3D view cannot be shown: ${error.message}`;
     return null;
   }
@@ -70,6 +71,8 @@ function facts(lane) {
 function showLanes() {
   curves.shown = labels.map(({ box }) => box.checked);
   if (stage) stage.shown = curves.shown;
+  else labels.forEach(({ label, box }) => { label.hidden = !box.checked; });
+  stale = true;
   curves.draw();
   paint();
 }
@@ -172,7 +175,7 @@ bindKeys([
   [[' '], 'play or pause', () => playback.play()],
   [['ArrowLeft', 'ArrowRight'], 'one frame back or on', () => playback.step(-1), () => playback.step(1)],
   [['Shift+ArrowLeft', 'Shift+ArrowRight'], 'ten frames', () => playback.step(-10), () => playback.step(10)],
-  [['Home', 'End'], 'first or last frame', () => playback.seek(0), () => playback.seek(playback.duration)],
+  [['Home', 'End'], 'first or last frame', () => playback.stopAt(0), () => playback.stopAt(playback.duration)],
   [['p', 'n'], 'previous or next border of a segment or phase, or pin', () => timeline.toBorder(-1), () => timeline.toBorder(1)],
   [['[', ']'], 'slower, faster', () => setSpeed(-1), () => setSpeed(1)],
   [['l'], 'again and again, or stop at the end', toggleLoop],
@@ -184,6 +187,7 @@ bindKeys([
   [['w', 's'], 'orbit up, down', turn(0, -0.1), turn(0, 0.1)],
   [['+', '-'], 'nearer, further', () => stage?.orbitBy(0, 0, 0.87), () => stage?.orbitBy(0, 0, 1.15)],
   [['0'], 'view as at first', () => stage?.resetView()],
+  [['Escape'], 'leave a list, in which keys choose', () => {}],
   [['?'], 'show or hide this list', () => { find('help').open = !find('help').open; }],
 ], find('key-list'), () => find('keys-on').checked);
 
@@ -199,6 +203,15 @@ for (const { name, source } of page.figures) {
 }
 find('figures').hidden = !page.figures.length;
 
+/** Time code of the first lane that is shown, in words; none where that is over. */
+function timeCode() {
+  const lane = lanes[curves.shown.indexOf(true)];
+  const side = stage?.mode;
+  if (!lane || laneEnded(lane, playback.time, side)) return '';
+  const frame = Math.round(laneTime(lane, playback.time, side) * lane.file_fps);
+  return `, time code ${+(lane.first_time_code + frame * lane.time_codes_per_frame).toFixed(2)}`;
+}
+
 // Every frame: what has changed is drawn, nothing else.
 function draw() {
   const playing = playback.playing;
@@ -206,10 +219,7 @@ function draw() {
     find('play').dataset.on = playing;
     find('play').textContent = playing ? 'Pause' : 'Play';
   }
-  const [first] = lanes;
-  const frame = Math.round(playback.time * first.file_fps);
-  const code = first.first_time_code + frame * first.time_codes_per_frame;
-  timeline.update(`${playback.time.toFixed(2)} s, time code ${+code.toFixed(2)}`);
+  timeline.update(`${playback.time.toFixed(2)} s${timeCode()}`);
   curves.update();
   if (!stage) return;
   stage.characters.forEach((character, i) => {

@@ -26,10 +26,15 @@ export class Playback {
     this.changed();
   }
 
+  /** Moves to a time, and stops there. */
+  stopAt(time) {
+    this.playing = false;
+    this.seek(time);
+  }
+
   /** Moves to a frame `count` frames away, and stops there. */
   step(count) {
-    this.playing = false;
-    this.seek((Math.round(this.time * this.fps) + count) / this.fps);
+    this.stopAt((Math.round(this.time * this.fps) + count) / this.fps);
   }
 
   setSpeed(speed) {
@@ -53,6 +58,12 @@ export class Playback {
     if (!this.loop) this.playing = false;
     this.seek(this.loop ? time % this.duration : this.duration);
   }
+}
+
+/** Whether a lane shows nothing of its own at a time of the page, since its motion is over. */
+export function laneEnded(lane, time, side) {
+  const warp = lane.retime[side] ?? lane.retime.right ?? lane.retime.left;
+  return time > (warp ? warp[warp.length - 1][0] : lane.duration) + 0.5 / lane.fps;
 }
 
 /** Seconds of a lane's own clip at a time of the page, for the hand that is looked at. */

@@ -25,8 +25,7 @@ export class Timeline {
     const { time } = this.playback;
     const ahead = this.borders.filter((t) => direction * (t - time) > 1e-3);
     if (ahead.length === 0) return;
-    this.playback.play(false);
-    this.playback.seek(direction > 0 ? Math.min(...ahead) : Math.max(...ahead));
+    this.playback.stopAt(direction > 0 ? Math.min(...ahead) : Math.max(...ahead));
   }
 
   update(text) {
@@ -46,7 +45,7 @@ export class Timeline {
   #row(row) {
     const name = `${row.label}, ${row.side}`;
     const track = element('div', { class: 'track spans', role: 'img' });
-    track.setAttribute('aria-label', `${name}: ${row.spans.length} spans, ${row.marks.length} marks`);
+    track.setAttribute('aria-label', `${name}, ${row.lane}: ${many(row.spans, 'span')}, ${many(row.marks, 'mark')}`);
     const place = (time) => `${(100 * time) / (this.playback.duration || 1)}%`;
     row.spans.forEach((span, i) => {
       const box = element('span', { class: `span ${i % 2 ? 'odd' : ''} ${span.look ? 'look' : ''}` });
@@ -64,7 +63,8 @@ export class Timeline {
       track.append(box);
     }
     const label = element('span', { class: `label ${row.side}` }, name);
-    label.title = row.source;
+    label.append(element('small', {}, row.lane));
+    label.title = [row.lane, row.source].filter(Boolean).join(': ');
     const value = element('span', { class: 'value' });
     return { row, value, cells: [label, track, value] };
   }
@@ -92,6 +92,10 @@ export class Timeline {
       move(event, track);
     });
   }
+}
+
+function many(items, noun) {
+  return `${items.length} ${noun}${items.length === 1 ? '' : 's'}`;
 }
 
 function borders(rows) {
