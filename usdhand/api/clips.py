@@ -10,7 +10,7 @@ from usdhand.compare import Comparison, compare_clips
 from usdhand.errors import HandNotFoundError, UsageError
 from usdhand.formats.files import reopened
 from usdhand.formats.usd.write import write_motion
-from usdhand.motion import Clip
+from usdhand.motion import Clip, Problem
 
 
 def find_hands(
@@ -56,8 +56,10 @@ def write_clip(
     force: bool = False,
     conventions: Conventions | None = None,
     inputs: Sequence[Path] = (),
-) -> None:
+) -> tuple[Problem, ...]:
     """Write a clip's hands as a layer over the file it was read from; the body stays as it is.
+
+    Returns what one file, if it was to be one, could not keep.
 
     Raises
     ------
@@ -68,7 +70,7 @@ def write_clip(
     """
     character = reopened(clip)
     changed = [j for f in find_hands(clip, conventions).frames.values() for j in f.links.moving]
-    write_motion(
+    return write_motion(
         character, clip, changed, Path(output), flatten=flatten, force=force, inputs=inputs
     )
 

@@ -13,7 +13,7 @@ from usdhand.api.clips import find_hands
 from usdhand.errors import UsageError
 from usdhand.formats.files import read_any, reopened
 from usdhand.formats.usd import rig as usd_rig
-from usdhand.motion import Clip
+from usdhand.motion import Clip, Problem
 from usdhand.motion.resample import in_time_of
 from usdhand.reduce import (
     PRESETS,
@@ -143,9 +143,12 @@ def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
 
 def write_rig(
     reduction: Reduction, output: str | Path, *, flatten: bool = False, force: bool = False
-) -> None:
-    """Write a reduced clip as a rig over the file it was read from."""
-    usd_rig.write_rig(
+) -> tuple[Problem, ...]:
+    """Write a reduced clip as a rig over the file it was read from.
+
+    Returns what one file, if it was to be one, could not keep.
+    """
+    return usd_rig.write_rig(
         reduction, reopened(reduction.clip), Path(output), flatten=flatten, force=force
     )
 

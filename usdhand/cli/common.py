@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from usdhand.errors import UsdHandError
-    from usdhand.motion import Clip
+    from usdhand.motion import Clip, Problem
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -139,6 +139,15 @@ def warn_of(clip: Clip, quiet: bool) -> None:
     for problem in clip.problems:
         if problem.severity == "warning":
             warn(f"{clip.origin.path}: {problem}", quiet)
+
+
+def warn_lost(output: object, lost: Iterable[Problem], quiet: bool) -> None:
+    """Print what an output could not keep."""
+    for problem in lost:
+        if problem.severity == "warning":
+            warn(f"{output}: {problem}", quiet)
+        else:
+            say(f"{output}: {problem}", quiet)
 
 
 def with_progress(items: Sequence[Any], label: str) -> Iterator[Any]:

@@ -18,6 +18,7 @@ from usdhand.cli.common import (
     report_option,
     say,
     skel_option,
+    warn_lost,
     warn_of,
     write_report,
 )
@@ -79,9 +80,10 @@ def command(
         motion = api.expand_onto(rig, onto, skel, conventions)
     warn_of(motion, quiet)
     if not dry_run:
-        api.write_clip(
+        lost = api.write_clip(
             motion, output, flatten=flatten, force=force, conventions=conventions, inputs=inputs
         )
+        warn_lost(output, lost, quiet or as_json)
     result = {
         "output": None if dry_run else str(output),
         "frames": len(motion),

@@ -28,6 +28,7 @@ from usdhand.cli.common import (
     table,
     verbose_option,
     warn,
+    warn_lost,
     warn_of,
     with_progress,
     write_plots,
@@ -189,7 +190,8 @@ def command(
         for reduction, target in with_progress(
             list(zip(reductions, outputs, strict=True)), "writing"
         ):
-            api.write_rig(reduction, target, flatten=flatten, force=force)
+            lost = api.write_rig(reduction, target, flatten=flatten, force=force)
+            warn_lost(target, lost, quiet or as_json)
     write_report(report, text, force)
     write_plots(plots, lambda: reducing.figures(reductions), force, quiet or as_json)
     if as_json:

@@ -24,7 +24,7 @@ from usdhand.formats.usd.stage import (
     open_stage,
 )
 from usdhand.formats.usd.write import free_child, write_motion
-from usdhand.motion import Clip
+from usdhand.motion import Clip, Problem
 from usdhand.motion.rotations import Array
 from usdhand.reduce import ReducedRig, Reduction, Relation
 from usdhand.reduce.rig import Kind, evaluation_order
@@ -76,10 +76,10 @@ def write_rig(
     *,
     flatten: bool = False,
     force: bool = False,
-) -> None:
+) -> tuple[Problem, ...]:
     """Write a rig over its clip, with the reduced motion baked beside it.
 
-    Raises the errors of `write_motion`.
+    Returns what one file, if it was to be one, could not keep. Raises the errors of `write_motion`.
     """
     frames = reduction.hands.frames.values()
     stage, skeleton = character.stage, character.skeleton.GetPath()
@@ -91,7 +91,7 @@ def write_rig(
             Sdf.CreatePrimInLayer(layer, path).SetInfo("active", False)
         author_rig(layer, free_child(stage, root, RIG_NAME), reduction, skeleton)
 
-    write_motion(
+    return write_motion(
         character,
         reduction.motion,
         [j for f in frames for j in f.links.moving],
