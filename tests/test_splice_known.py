@@ -20,6 +20,7 @@ from known_pairs import (
 
 from usdhand.anatomy import Side
 from usdhand.api import find_hands, read_clip
+from usdhand.api.splicing import splice_hands
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
@@ -162,6 +163,43 @@ def test_a_pin_moves_the_warp_only_around_it() -> None:
     one_hand = SpliceSettings(pins=(replace(pins[0], side="right"),))
     hands = spliced(pair, one_hand).hands
     assert np.array_equal(hands["left"].warp, spliced(pair).hands["left"].warp)
+
+
+@pytest.mark.parametrize(
+    ("pins", "near"),
+    [
+        (["300:300", "301:303"], 3.0),
+        (["300:300", "301:306"], 3.0),
+        (["300:306"], 3.0),
+        (["300:300", "310:300"], 3.0),
+        (["300:300", "301:361", "302:362"], 1.0),
+    ],
+)
+def test_pins_that_change_the_speed_do_not_swing(pins: list[str], near: float) -> None:
+    """Both clips are the same take, all is right but the pins: before them little may move."""
+    folder = SAMPLES / "conversations"
+    body, hands = read_clip(folder / "talk_01_body.usdc"), read_clip(folder / "talk_01_full.usdc")
+    found = splice_hands(body, hands, pins=pins, sides=["right"]).hands["right"]
+    off = found.warp[:, 1] * hands.fps - np.arange(len(body))
+    assert np.abs(off[[279, 287, 290]]).max() < near
+    assert np.abs(off[[99, 399, 499]]).max() < 0.5
+
+
+@pytest.mark.parametrize("count", [2, 30, 120])
+def test_true_pins_around_frames_that_were_held(count: int) -> None:
+    """The hand clip shows its frames before 300 twice; pins say so."""
+    folder = SAMPLES / "conversations"
+    body, full = read_clip(folder / "talk_01_body.usdc"), read_clip(folder / "talk_01_full.usdc")
+    at = np.concatenate([np.arange(300), np.arange(300 - count, len(full))])
+    longer = replace(
+        full,
+        **{k: getattr(full, k)[at] for k in ("rotations", "translations", "scales")},
+    )
+    pins = ["300:300", f"301:{301 + count}"]
+    true = np.arange(len(body)) + np.where(np.arange(len(body)) < 300, 0, count)
+    for alignment in splice_hands(body, longer, pins=pins).hands.values():
+        off = np.abs(alignment.warp[:, 1] * full.fps - true) / full.fps
+        assert off.max() < VISIBLE_S
 
 
 @pytest.mark.real_data

@@ -140,6 +140,15 @@ def test_a_stiff_curve_is_the_least_squares_one(n: int) -> None:
     assert abs(stiff(values, weights, 7.0)[1] - values[1]) < 1e-6
 
 
+def test_a_stiff_curve_bends_freely_at_what_is_exact() -> None:
+    rows = np.arange(101.0)
+    values, weights = np.maximum(rows - 50.0, 0.0) * 3.0, np.full(101, 0.02)
+    weights[50] = EXACT
+    assert np.abs(stiff(values, weights, 500.0) - values).max() < 1e-6
+    values[51:] += 40.0  # a jump after the pin is nothing to what is before it
+    assert np.abs(stiff(values, weights, 500.0) - values)[:50].max() < 1e-6
+
+
 def test_wide_smoothing_is_nearly_gaussian() -> None:
     pulse = np.zeros(801)
     pulse[400] = 1.0
@@ -279,7 +288,8 @@ def test_pins_are_met_whatever_the_warp(seed: int, count: int) -> None:
     wanted = np.sort(random.uniform(0.0, 8.0, count))
     slack = random.choice([0.0, 0.3], count)
     pins = [Pin(times[f], h, s) for f, h, s in zip(frames, wanted, slack, strict=True)]
-    moved = through_pins(warp, times, pins)
-    assert (np.diff(moved) >= 0).all()
-    off = np.abs(moved[frames] - wanted)
-    assert (off <= slack + 1e-9).all()
+    for spread in (0.02, 0.25, np.inf):
+        moved = through_pins(warp, times, pins, spread)
+        assert (np.diff(moved) >= 0).all()
+        off = np.abs(moved[frames] - wanted)
+        assert (off <= slack + 1e-9).all()

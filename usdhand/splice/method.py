@@ -35,6 +35,8 @@ Wrist = Literal["body", "hands"]
 STILL, LEAST_SHARE = 0.1, 0.1
 # The band of pass 2 is not wider, in seconds, however long the clips.
 MOST_BAND_S = 10.0
+# Beside a pin, a matched warp may move by its tolerance and this share of the time to the pin.
+ROOM_SHARE = 0.25
 # Rounds of matching signs with the hand clip in the body's time.
 ROUNDS = 2
 
@@ -216,10 +218,15 @@ def align(
 
 
 def _room(times: Array, pins: Sequence[Pin]) -> Array:
-    """Seconds (times,) by which a warp that goes through all pins may still move."""
+    """Seconds (times,) by which a warp that goes through all pins may still move.
+
+    Where a pin demands a jump, the hand clip as shown around it moves as no hand does, so that
+    matching it again would tell nothing.
+    """
     room = np.full(len(times), np.inf)
     for pin in pins:
-        room[np.abs(times - pin.body) < 0.75 * times[1]] = pin.tolerance
+        away = np.maximum(np.abs(times - pin.body) - 0.75 * times[1], 0.0)
+        np.minimum(room, pin.tolerance + ROOM_SHARE * away, out=room)
     return room
 
 
@@ -298,7 +305,7 @@ def _reach(markers: Markers, smoothing: float) -> float:
 
 
 def _following(alignment: Alignment, side: Side, pins: tuple[Pin, ...], times: Array) -> Alignment:
-    warp = through_pins(alignment.warp[:, 1], times, pins)
+    warp = through_pins(alignment.warp[:, 1], times, pins, np.inf)
     return replace(
         alignment, warp=np.stack([times, warp], axis=1), pins=pins, phases=(), taken_from=side
     )

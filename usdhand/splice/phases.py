@@ -162,7 +162,7 @@ def settled(
     weights = _evidence(ours[0], theirs[0], path.middle, SHIFT_S * body.fps)
     weights[[0, -1]] = 1.0
     weights[(warp < 0.0) | (warp > len(hand) - 1.0)] = LEAST_EVIDENCE
-    weights[reach == 0] = EXACT
+    weights[room == 0] = EXACT
     matched = np.interp(path.open_ended, rows, warp)
     return monotone(stiff(matched, weights, STIFFNESS * (body.fps / 60.0) ** 4))
 

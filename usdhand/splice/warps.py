@@ -9,6 +9,9 @@ import numpy as np
 from usdhand.motion.rotations import Array
 from usdhand.splice.band import Pin
 
+# Seconds to either side of a pin over which a matched warp gives way. Matching knows the pins, so
+# that little is missing: a path that jumps to a pin does so in one row.
+SPREAD_S = 0.02
 # Weight of a value that a warp goes through exactly.
 EXACT = 1e9
 
@@ -16,18 +19,21 @@ EXACT = 1e9
 def stiff(values: Array, weights: Array, stiffness: float) -> Array:
     """Curve (n,) near values where they have weight, and bent as little as possible elsewhere.
 
-    Minimises the sum of weights * (curve - values)^2 + stiffness * (second difference)^2.
+    Minimises the sum of weights * (curve - values)^2 + stiffness * (second difference)^2. Where a
+    value is exact the curve may change its direction: else what a pin demands on one of its sides
+    would swing on the other.
     """
     from scipy.linalg import solveh_banded
 
-    n = len(values)
-    middle, beside = np.full(n, 6.0), np.full(n, -4.0)
-    middle[[0, -1]], middle[[1, -2]] = 1.0, 5.0
-    beside[[1, -1]] = -2.0
-    if n == 3:  # both neighbours of the only inner frame are ends
-        middle[1] = 4.0
-    bands = stiffness * np.stack([np.ones(n), beside, middle])
-    bands[2] += weights
+    bend = stiffness * (weights[1:-1] < EXACT)  # of frames 1 to n - 2
+    bands = np.zeros((3, len(values)))
+    bands[0, 2:] = bend
+    bands[1, 1:-1] -= 2.0 * bend
+    bands[1, 2:] -= 2.0 * bend
+    bands[2] = weights
+    bands[2, :-2] += bend
+    bands[2, 1:-1] += 4.0 * bend
+    bands[2, 2:] += bend
     return np.asarray(solveh_banded(bands, weights * values))
 
 
@@ -36,11 +42,11 @@ def monotone(warp: Array) -> Array:
     return np.asarray((np.maximum.accumulate(warp) + np.minimum.accumulate(warp[::-1])[::-1]) / 2)
 
 
-def through_pins(warp: Array, times: Array, pins: Sequence[Pin]) -> Array:
+def through_pins(warp: Array, times: Array, pins: Sequence[Pin], spread: float = SPREAD_S) -> Array:
     """Warp moved so that it goes through every pin within its tolerance, and exactly where 0.
 
-    What is missing at the pins is spread linearly over the time between them; nothing passes a pin
-    before its time.
+    What is missing at the pins is spread over some seconds to either side, or the time between
+    two; nothing passes a pin before its time.
     """
     if not pins:
         return warp
@@ -49,11 +55,15 @@ def through_pins(warp: Array, times: Array, pins: Sequence[Pin]) -> Array:
     slack = np.array([p.tolerance for p in pins])
     off = wanted - np.interp(at, times, warp)
     missing = np.sign(off) * np.maximum(np.abs(off) - slack, 0.0)
-    ends = (times[0] - 1e-9, times[-1] + 1e-9)
-    knots, values = np.array([ends[0], *at, ends[1]]), np.array([0.0, *missing, 0.0])
+    alone = np.diff(at, prepend=-np.inf, append=np.inf) >= 2.0 * spread
+    before = np.maximum(at[alone[:-1]] - spread, times[0] - 1e-9)
+    after = np.minimum(at[alone[1:]] + spread, times[-1] + 1e-9)
+    knots = np.concatenate([at, before, after])
+    values = np.concatenate([missing, np.zeros(len(knots) - len(at))])
+    order = np.argsort(knots, kind="stable")
     lowest = np.maximum.accumulate([-np.inf, *(wanted - slack)])
     highest = np.minimum.accumulate([np.inf, *(wanted + slack)[::-1]])[::-1]
     least = lowest[np.searchsorted(at, times, "right")]
     most = highest[np.searchsorted(at, times, "left")]
-    moved = np.clip(warp + np.interp(times, knots, values), least, most)
+    moved = np.clip(warp + np.interp(times, knots[order], values[order]), least, most)
     return np.asarray(np.maximum.accumulate(moved))
