@@ -160,6 +160,17 @@ def test_histograms_count_channels_and_pairs(reduction: Reduction) -> None:
     assert sum(b.get_height() for b in figure.axes[1].patches[:5]) == close[0]
 
 
+def test_a_rig_of_other_clips_says_what_it_does(reduction: Reduction) -> None:
+    """Channels that do not move here, and those that the rig holds since they did not there."""
+    [found] = api.reduce_hands([api.read_clip(OK)], rig=reduction.rig)
+    constant = sum(r.kind == "constant" for r in found.rig.relations)
+    ranges = np.ptp(found.source.select(found.rig.names).values, axis=0)
+    still = int((ranges < found.rig.range_threshold).sum())
+    assert constant != still
+    legend = reducing.histograms([found]).axes[0].get_legend().get_texts()[0].get_text()
+    assert legend == f"below 5 deg: {still} channels\nthis rig holds {constant} constant"
+
+
 def test_curves_are_the_original_and_the_reduced_ones(reduction: Reduction) -> None:
     figure = reducing.curves([reduction])
     worst = np.argsort(-reduction.errors.rms)[: reducing.MOST_CURVES]
@@ -279,6 +290,21 @@ def test_graph_has_costs_and_the_cheapest_path(filled: Filled, library: MotionLi
         segment = choice.candidates[choice.chosen].segment
         assert library.clips[part.space.clips[segment]].name in text
         assert f"cost {choice.node_cost:.3g}" in text
+
+
+def test_one_segment_has_room_for_its_caption(body: Clip, library: MotionLibrary) -> None:
+    short = part_of(body, slice(0, 8))
+    part = fill_api.fill_fingers(short, library, FillSettings(k=1), sides=("left",)).parts[0]
+    assert len(part.alternatives[0].choices) == 1
+    figure = filling.graph(part, library)
+    with style.look():
+        figure.draw_without_rendering()
+        whole = figure.bbox
+        words = [figure.axes[0].xaxis.label, *figure.axes[0].texts, *figure.texts]
+        boxes = [text.get_window_extent() for text in words]
+    assert len(boxes) == 3
+    assert all(whole.x0 <= b.x0 and b.x1 <= whole.x1 for b in boxes)
+    assert all(whole.y0 <= b.y0 and b.y1 <= whole.y1 for b in boxes)
 
 
 def test_the_network_is_what_the_path_was_found_in(filled: Filled) -> None:

@@ -7,6 +7,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -307,10 +308,10 @@ def test_segments_of_a_fill_report_are_on_the_timeline(results: Results, tmp_pat
         ]
 
 
-def rows_with(report: Path, folder: Path, *files: Path) -> list[dict]:
+def rows_with(report: Path, folder: Path, *files: Path) -> list[dict[str, Any]]:
     run("preview", *files, "--with-report", report, "-o", folder / "rows.html", "--force",
         "--max-points", "0")  # fmt: skip
-    return page_data(folder / "rows.html")["rows"]
+    return list(page_data(folder / "rows.html")["rows"])
 
 
 def test_rows_name_the_lane_that_they_tell_of(results: Results, tmp_path: Path) -> None:

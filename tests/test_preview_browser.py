@@ -7,14 +7,15 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from cli_runner import run
-from preview_pages import FLAGS, GESTURES, chromium, make_results, one_minute
+from conftest import shared_data
+from preview_pages import FLAGS, GESTURES, chromium, make_results, one_minute, page_data
 
 from usdhand import api
 from usdhand.motion import forward_kinematics
@@ -290,6 +291,72 @@ def test_keys_step_and_jump(pages: Pages, folder: Path) -> None:
     page.page.locator("#hand").focus()
     page.press("o")
     assert page.page.get_attribute("#overlay", "aria-pressed") == "false"
+    page.press("Escape", "o")
+    assert page.page.get_attribute("#overlay", "aria-pressed") == "true"
+
+
+def test_first_and_last_frame_stop_the_playback(pages: Pages, folder: Path) -> None:
+    page = pages.open(folder / "fill.html")
+    end = api.read_clip(folder / "filled.usda").duration
+    assert page.page.get_attribute("#loop", "aria-pressed") == "true"
+    for key, time in (("End", end), ("Home", 0.0)):
+        page.press("Space")
+        page.page.wait_for_function("() => Number(document.getElementById('scrub').value) > 0.1")
+        page.press(key)
+        assert page.page.text_content("#play") == "Play"
+        assert page.time == pytest.approx(time)
+
+
+def test_a_lane_that_is_over_says_so(pages: Pages, tmp_path: Path) -> None:
+    files = [GESTURES / "ok_03.usdc", GESTURES / "ok_04.usdc"]
+    clips = [api.read_clip(f) for f in files]
+    run("preview", *files, "--max-points", "0", "-o", tmp_path / "two.html")
+    page = pages.open(tmp_path / "two.html")
+    short = int(clips[0].duration > clips[1].duration)
+    numbers = page.page.locator("#curve-rows .value").first.locator(".number")
+
+    def grey() -> list[bool]:
+        colours = [numbers.nth(i).evaluate("(e) => getComputedStyle(e).color") for i in (0, 1)]
+        muted = page.page.locator("footer").evaluate("(e) => getComputedStyle(e).color")
+        return [colour == muted for colour in colours]
+
+    page.page.fill("#scrub", str(clips[short].duration))
+    page.settle()
+    assert grey() == [False, False]
+    page.page.fill("#scrub", str(clips[1 - short].duration))
+    page.settle()
+    assert grey() == [i == short for i in (0, 1)]
+    # The time code is that of the first lane that is shown, as long as it plays.
+    codes = [float(c.time_codes[-1]) for c in clips]
+    for shown in (0, 1):
+        page.page.set_checked(f"#lane-{shown}", True)
+        page.page.set_checked(f"#lane-{1 - shown}", False)
+        page.settle()
+        said = page.page.text_content("#time")
+        assert said.endswith(" s" if shown == short else f"time code {codes[shown]:g}")
+
+
+@pytest.mark.real_data
+def test_a_flat_hand_is_seen(pages: Pages, tmp_path: Path) -> None:
+    """Bones end where the joints are, that hang off nothing."""
+    file = shared_data("gltf", "webxr-generic-hand", "left.glb")
+    run("preview", file, "-o", tmp_path / "hand.html")
+    page = pages.open(tmp_path / "hand.html")
+    assert near(page.picture, BLUE) > 3000
+    clip = api.read_character(file)
+    at = forward_kinematics(clip).positions[0]
+    bones = page_data(tmp_path / "hand.html")["lanes"][0]["bones"]
+    found = page.page.evaluate("""async () => {
+      const { unpack } = await import('data');
+      const { Character } = await import('character');
+      const page = JSON.parse(document.getElementById('page-data').textContent);
+      const { sticks } = new Character(page.lanes[0], await unpack(page));
+      return [...sticks.instanceMatrix.array];
+    }""")
+    matrices = np.array(found).reshape(len(bones), 4, 4)
+    for bone, matrix in zip(bones, matrices, strict=True):
+        assert matrix[3, :3] == pytest.approx(at[bone["joint"]], abs=1e-3)
+        assert (matrix[1] + matrix[3])[:3] == pytest.approx(at[bone["child"]], abs=1e-3)
 
 
 def test_keys_can_be_turned_off_and_are_listed(pages: Pages, folder: Path) -> None:
@@ -454,6 +521,34 @@ def test_text_can_be_read_in_light_and_dark(pages: Pages, folder: Path, scheme: 
         assert (high + 0.05) / (low + 0.05) >= 4.5, (text, ink, ground)
 
 
+def test_marks_can_be_read_on_the_spans_below(pages: Pages, folder: Path) -> None:
+    page = pages.open(folder / "splice.html", color_scheme="light")
+    for scheme in ("light", "dark"):
+        page.page.emulate_media(color_scheme=scheme)
+        for ink, ground in inks_and_grounds(page.page):
+            high, low = sorted((luminance(ink), luminance(ground)), reverse=True)
+            assert (high + 0.05) / (low + 0.05) >= 4.5, (scheme, ink, ground)
+
+
+def inks_and_grounds(page: Any) -> list[tuple[str, str]]:
+    """Colours of the timeline's marks, each with all that they may stand on."""
+    grounds = page.evaluate("""() => {
+      const track = document.querySelector('.track.spans');
+      return ['span', 'span odd', 'span look', ''].map((name) => {
+        const made = document.createElement('span');
+        made.className = name;
+        track.append(made);
+        const colour = getComputedStyle(name ? made : track).backgroundColor;
+        made.remove();
+        return colour;
+      });
+    }""")
+    inks = page.eval_on_selector_all(".mark", "(all) => all.map((e) => getComputedStyle(e).color)")
+    assert len(set(grounds)) == 4
+    assert inks
+    return list(product(sorted(set(inks)), grounds))
+
+
 def luminance(colour: str) -> float:
     parts = [float(x) for x in re.findall(r"[\d.]+", colour)[:3]]
     values = np.array(parts) / (1 if "srgb" in colour else 255)
@@ -490,6 +585,14 @@ def test_without_webgl_the_rest_still_works(browser: Any, folder: Path) -> None:
     page.goto((folder / "fill.html").as_uri())
     page.wait_for_function(READY)
     assert "The 3D view cannot be shown" in page.locator("#trouble").text_content()
+    boxes = [label.bounding_box() for label in page.locator(".lane-label:visible").all()]
+    assert len(boxes) == 2
+    apart = [
+        boxes[1][x] >= boxes[0][x] + boxes[0][size] for x, size in (("x", "width"), ("y", "height"))
+    ]
+    assert any(apart)
+    page.uncheck("#lane-0")
+    assert page.locator(".lane-label:visible strong").all_text_contents() == ["ok_03"]
     page.keyboard.press("End")
     page.wait_for_function("() => Number(document.getElementById('scrub').value) > 1")
     page.context.close()
@@ -504,6 +607,9 @@ def test_figures_and_segments_are_there(pages: Pages, folder: Path) -> None:
     counts = [len(report[side]["segments"]) for side in ("left", "right")]
     rows = page.page.locator(".track.spans")
     assert [rows.nth(i).locator(".span").count() for i in range(2)] == counts
+    assert rows.first.get_attribute("aria-label").startswith("segments, left, filled choice_1: ")
+    lanes = page.page.locator("#rows .label small").all_text_contents()
+    assert lanes == ["filled choice_1"] * 2
     first = report["left"]["segments"][0]
     assert first["clip"] in page.page.locator("#rows .value").first.text_content()
 
