@@ -134,6 +134,13 @@ def test_reduce_draws(tmp_path: Path) -> None:
     assert "use --force" in run(*given, code=2).output
 
 
+def test_no_plot_of_what_there_is_nothing_to_show_of(tmp_path: Path) -> None:
+    """All channels that move are free here: none follows, and none is changed."""
+    given = ("-n", "-o", tmp_path / "rig.usda", "--plots", tmp_path)
+    run("reduce", OK, "--max-error", "0.0001", *given)
+    assert {p.stem for p in tmp_path.glob("*.svg")} == {"reduce_histograms", "reduce_errors"}
+
+
 def test_plots_are_refused_before_any_work(tmp_path: Path) -> None:
     """Also where it is not yet known which hands there will be."""
     (tmp_path / "fill_graph_right.png").write_text("mine")
@@ -146,6 +153,8 @@ def test_plots_are_refused_before_any_work(tmp_path: Path) -> None:
     inside = file / "plots"
     text = run("reduce", OK, "-n", "-o", tmp_path / "x.usda", "--plots", inside, code=2).output
     assert "is a file" in text
+    text = run("reduce", OK, "-n", "-o", tmp_path / "x.usda", "--plots", "", code=2).output
+    assert "no folder has an empty name" in text
 
 
 def test_fill_and_evaluate_draw(library_file: Path, tmp_path: Path) -> None:
