@@ -321,12 +321,37 @@ def test_joints_that_no_library_clip_has_are_kept(
     out = tmp_path / "o.usda"
     text = run("fill", BODY, "--library", path, "-o", out).output
     assert "no clip of the library has ThumbIP, PinkyDIP of the left hand" in text
-    one = replace(few, clips=(*few.clips[:1], library.clips[5]))  # most joints, if of few clips
-    assert filling.fill_fingers(body, one).missing == {}
     take = api.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
     errors, left = filling.measure_library(few, SAMPLES, FillSettings(), takes=[take])
     assert not left
     assert all(np.isfinite(e.degrees) for e in errors)
+
+
+def test_one_clip_of_a_richer_rig_does_not_switch_off_the_others(
+    body: Clip, library: MotionLibrary, tmp_path: Path
+) -> None:
+    gone = ("PinkyPIP", "PinkyDIP")
+    few = without_joints(library, gone)
+    mixed = replace(few, clips=(*few.clips[:-1], library.clips[-1]))
+    path, out = tmp_path / "mixed.usdc", tmp_path / "o.usda"
+    filling.write_library(mixed, path)
+    text = run("fill", BODY, "--library", path, "-o", out).output
+    data = json.loads(
+        run("fill", BODY, "--library", path, "-n", "-o", tmp_path / "n.usda", "--json").stdout
+    )
+    name = library.clips[-1].name
+    assert f"only 1 clip of the library ({name}) has PinkyPIP, PinkyDIP of the left hand" in text
+    assert len({s["clip"] for s in data["hands"]["right"]["segments"]}) > 10
+    assert data["missing"] == {"left": list(gone), "right": list(gone)}
+    assert data["set_aside"] == {}
+    rich = replace(few, clips=(few.clips[0], *library.clips[1:]))  # one poorer clip is set aside
+    filled = filling.fill_fingers(body, rich)
+    assert filled.missing == {}
+    assert filled.set_aside == dict.fromkeys(SIDES, (library.clips[0].name,))
+    filling.write_library(rich, path, force=True)
+    text = run("fill", BODY, "--library", path, "-n", "-o", tmp_path / "n.usda").output
+    assert "left hand: 1 clip of the library set aside for lack of joints" in text
+    assert library.clips[0].name in text
 
 
 def test_both_hands_as_one_have_figures_of_their_own(library_file: Path, tmp_path: Path) -> None:

@@ -106,6 +106,49 @@ def test_what_someone_edited_stays(folder: Path, library: Path) -> None:
     assert [c.label for c in clips] == ["big", "fine", "circle", "wipe"]
 
 
+def words(library: Path) -> dict[str, tuple[str, str]]:
+    return {c.name: (c.label, c.actor) for c in filling.read_library(library).clips}
+
+
+def test_hand_work_outlives_changed_files_and_rebuild(folder: Path, library: Path) -> None:
+    edit_prim(library, "/Clips/ok_02.usdhand:label", "circle")
+    edit_prim(library, "/Clips/ok_02.usdhand:actor", "Ada")
+    edit_prim(library, "/Clips/wipe_01.usdhand:label", "")
+    shutil.copy(GESTURES / "small_03.usdc", folder / "gestures" / "ok_02.usdc")
+    expected = {"ok_02": ("circle", "Ada"), "wipe_01": ("", "")}
+    expected |= {"big_01": ("big", ""), "ok_01": ("ok", "")}
+    assert build(folder)["read"] == 1
+    assert words(library) == expected
+    assert build(folder, "--rebuild")["read"] == 4
+    assert words(library) == expected
+    table = folder / "labels.csv"
+    table.write_text("file,label\nok_02,ring\n")
+    build(folder, "--labels", table, "--rebuild")
+    assert words(library) == expected | {"ok_02": ("ring", "Ada")}
+    # A file that was renamed takes its label along; the new one of its name has none yet.
+    (folder / "gestures" / "ok_02.usdc").rename(folder / "gestures" / "fine_01.usdc")
+    shutil.copy(GESTURES / "ok_02.usdc", folder / "gestures" / "ok_02.usdc")
+    build(folder)
+    assert words(library) == expected | {"fine_01": ("ring", "Ada"), "ok_02": ("ok", "")}
+
+
+def test_clips_that_are_not_given_any_more_are_listed(folder: Path, library: Path) -> None:
+    edit_prim(library, "/Clips/ok_02.usdhand:label", "circle")
+    one = folder / "gestures" / "ok_01.usdc"
+    shutil.copy(library, folder / "copy.usdc")
+    text = run("library", "build", one, "-o", library).output
+    assert "3 clips of the old library removed" in text
+    assert "gestures/ok_02.usdc: circle" in text
+    assert "gestures/big_01.usdc: big" not in text
+    data = json.loads(run("library", "build", one, "-o", folder / "copy.usdc", "--json").stdout)
+    assert {x["path"]: x["label"] for x in data["removed"]} == {
+        "gestures/big_01.usdc": "big",
+        "gestures/ok_02.usdc": "circle",
+        "gestures/wipe_01.usdc": "wipe",
+    }
+    assert build(folder)["removed"] == []
+
+
 def test_labels_from_a_table(folder: Path) -> None:
     table = folder / "labels.csv"
     table.write_text(
@@ -202,8 +245,14 @@ def edit_prim(library: Path, name: str, value: object) -> None:
 
 def test_a_library_of_another_version_is_refused(library: Path) -> None:
     edit_prim(library, ".usdhand:libraryVersion", 99)
-    with pytest.raises(InputError, match="version 99"):
+    with pytest.raises(InputError, match="version 99.*--rebuild"):
         filling.read_library(library)
+    gesture = library.parent / "gestures" / "ok_01.usdc"
+    again = library.with_name("again.usdc")
+    shutil.copy(library, again)
+    run("library", "build", gesture, "-o", again, code=3)
+    assert "are lost" in run("library", "build", gesture, "-o", again, "--rebuild").output
+    assert len(filling.read_library(again).clips) == 1
     edit_prim(library, ".usdhand:libraryVersion", 1)
     edit_prim(library, ".usdhand:segmentation:speed", -1.0)
     with pytest.raises(InputError, match="segmentation"):

@@ -24,13 +24,15 @@ from usdhand.formats.usd.library import is_library, read_library, relative_path,
 class BuildResult:
     """A built library and how many of its clips were read anew or taken over as they were.
 
-    ``unmatched`` are files that labels were given for and that are not among the clips.
+    ``unmatched`` are files that labels were given for and that are not among the clips;
+    ``removed`` are clips of the library before that are not among those given.
     """
 
     library: MotionLibrary
     read: int
     unchanged: int
     unmatched: tuple[str, ...] = ()
+    removed: tuple[LibraryClip, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ def build_library(
     segmentation: Segmentation | None = None,
     labels: Mapping[str, tuple[str, str]] | None = None,
     previous: MotionLibrary | None = None,
+    rebuild: bool = False,
     maps: Sequence[Path] = (),
     jobs: int = 1,
     progress: Callable[[Iterable[object], int], Iterable[object]] | None = None,
@@ -66,7 +69,9 @@ def build_library(
     output : where the library will be written, for relative paths
     labels : file -> (label, actor), the file with as many of its folders as tell it apart, with
         or without its suffix; else labels come from file names
-    previous : clips whose content has not changed are taken over from it, edited labels included
+    previous : clips whose content has not changed are taken over from it; labels that someone
+        edited, and actors, of the others too, as long as file or content is the same
+    rebuild : take over nothing but labels and actors
     jobs : processes
     keep : seconds after which what was read is kept beside the output, so that a build that was
         interrupted goes on where it was
@@ -79,29 +84,27 @@ def build_library(
     """
     cutting = segmentation or Segmentation()
     kept = _kept_file(output)
-    known = _known([previous, _read_kept(kept)])
+    known = _known([None if rebuild else previous, _read_kept(kept)])
     tasks: list[_Task] = []
     clips: list[LibraryClip] = []
     left: list[Left] = []
     used: set[str] = set()
-    for path, name in zip(paths, _unique_names(paths), strict=True):
-        content = file_hash(path)
+    contents = [file_hash(path) for path in paths]
+    before = _Before.of(previous, contents)
+    for path, name, content in zip(paths, _unique_names(paths), contents, strict=True):
         relative = relative_path(path, output)
         if content is None:
             left.append(Left(relative, "no such file"))
             continue
-        row = _row_of(path, labels or {})
-        given = (labels or {}).get(row)
-        used.add(row)
-        label, actor = given or (label_of(path.stem), "")
         old, cut_as = known.get((content, relative)) or known.get((content, "")) or (None, cutting)
+        row = _row_of(path, labels or {})
+        used.add(row)
+        label, actor = _words(path, (labels or {}).get(row), before.find(content, relative) or old)
         if old is None:
             task = _Task(path, name, relative, content, label, actor, cutting, tuple(maps))
             tasks.append(task)
             continue
-        if given or old.label == label_of(PurePosixPath(old.path).stem):  # not edited
-            old = replace(old, label=label, actor=actor or old.actor)
-        old = replace(old, name=name, path=relative)
+        old = replace(old, name=name, path=relative, label=label, actor=actor)
         clips.append(old if cut_as == cutting else _cut_again(old, cutting))
     unchanged = len(clips)
     results = _run(tasks, jobs)
@@ -121,7 +124,40 @@ def build_library(
     ordered = tuple(sorted(clips, key=lambda c: c.name))
     library = MotionLibrary(ordered, cutting, tuple(sorted(left, key=lambda entry: entry.path)))
     unmatched = tuple(file for file in labels or {} if file not in used)
-    return BuildResult(library, len(ordered) - unchanged, unchanged, unmatched)
+    here = {*contents, *(relative_path(path, output) for path in paths)}
+    removed = tuple(
+        clip
+        for clip in (previous.clips if previous else ())
+        if clip.content_hash not in here and clip.path not in here
+    )
+    return BuildResult(library, len(ordered) - unchanged, unchanged, unmatched, removed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Before:
+    """Clips of the library that is built again: by content and file, content, or file alone.
+
+    By file alone only where the content is nowhere else: there someone edited the file; else it
+    was given another name.
+    """
+
+    clips: Mapping[tuple[str, str], LibraryClip]
+
+    @classmethod
+    def of(cls, library: MotionLibrary | None, contents: Iterable[str | None]) -> _Before:
+        found: dict[tuple[str, str], LibraryClip] = {}
+        here = set(contents)
+        for clip in library.clips if library else ():
+            found.setdefault((clip.content_hash, clip.path), clip)
+            found.setdefault((clip.content_hash, ""), clip)
+            if clip.content_hash not in here:
+                found.setdefault(("", clip.path), clip)
+        return cls(found)
+
+    def find(self, content: str, path: str) -> LibraryClip | None:
+        """The clip with this content, or of this file."""
+        keys = ((content, path), (content, ""), ("", path))
+        return next((self.clips[key] for key in keys if key in self.clips), None)
 
 
 def forget_interrupted(output: Path) -> None:
@@ -179,6 +215,20 @@ def _row_of(path: Path, labels: Mapping[str, tuple[str, str]]) -> str:
             if labels.get(name):
                 return name
     return ""
+
+
+def _words(path: Path, given: tuple[str, str] | None, old: LibraryClip | None) -> tuple[str, str]:
+    """Label and actor: from a table, else as someone edited them before, else by the file's name."""
+    actor = old.actor if old else ""
+    if given:
+        return given[0], given[1] or actor
+    edited = old is not None and is_edited(old)
+    return (old.label if old and edited else label_of(path.stem)), actor
+
+
+def is_edited(clip: LibraryClip) -> bool:
+    """Whether a clip's label is not the one of its file's name."""
+    return clip.label != label_of(PurePosixPath(clip.path).stem)
 
 
 def label_of(stem: str) -> str:

@@ -33,6 +33,8 @@ from usdhand.cli.common import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from usdhand.fill import Filled, MotionLibrary
+
 
 @click.command("fill")
 @click.argument("body", type=click.Path(path_type=Path))
@@ -131,7 +133,7 @@ def command(
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps
-    from usdhand.report.filling import fill_result
+    from usdhand.report.filling import counted, fill_result
     from usdhand.report.plots import filling as plotting
 
     given: dict[str, Any] = {"metric": metric, "k": k}
@@ -179,18 +181,19 @@ def command(
         warn(f"{body}: the {' and '.join(filled.kept)} fingers move already and are kept", quiet)
     for hand in filled.without:
         warn(f"the library has no motion of a {hand} hand like this; it stays as it is", quiet)
-    for hand, names in filled.missing.items():
-        warn(f"no clip of the library has {', '.join(names)} of the {hand} hand: kept", quiet)
+    for note in _joint_notes(filled, motions):
+        warn(note, quiet)
     for part in filled.parts:
         if part.usable < settings.k:
             hands = " and ".join(part.part)
             warn(
-                f"the library has only {part.usable} segments for the {hands} hand, fewer than "
-                f"the {settings.k} candidates a segment that were asked for",
+                f"the library has only {counted(part.usable, 'segment')} for the {hands} hand, "
+                f"fewer than the {settings.k} candidates a segment that were asked for",
                 quiet,
             )
     if len(filled.clips) < alternatives:
-        warn(f"there are only {len(filled.clips)} ways that really differ", quiet)
+        ways = "is only 1 way" if len(filled.clips) == 1 else f"are only {len(filled.clips)} ways"
+        warn(f"there {ways} that really differ", quiet)
     if filled.left_out:
         warn(f"not used, since it is the same clip: {', '.join(filled.left_out)}", quiet)
     if not dry_run:
@@ -228,7 +231,37 @@ def command(
     say("nothing written (dry run)" if dry_run else f"written to {output}", quiet)
 
 
+def _joint_notes(filled: Filled, library: MotionLibrary) -> list[str]:
+    """Which joints were not filled, and which clips were not used for the sake of others."""
+    from usdhand.report.filling import counted, listed
+
+    notes = []
+    for hand, names in filled.missing.items():
+        some = [
+            clip.name
+            for clip in library.clips
+            if clip.name not in filled.left_out
+            and hand in clip.hands
+            and {*names} & {*clip.hands[hand].joints}
+        ]
+        which = (
+            f"only {counted(len(some), 'clip')} of the library ({listed(some)})"
+            if some
+            else "no clip of the library"
+        )
+        verb = "has" if len(some) < 2 else "have"
+        notes.append(f"{which} {verb} {', '.join(names)} of the {hand} hand: kept as in the body")
+    for hand, names in filled.set_aside.items():
+        notes.append(
+            f"{hand} hand: {counted(len(names), 'clip')} of the library set aside for lack of "
+            f"joints that the others have ({listed(names)})"
+        )
+    return notes
+
+
 def _text(result: dict[str, Any], verbose: bool) -> str:
+    from usdhand.report.filling import counted
+
     lines = []
     for side, paths in result.get("added_joints", {}).items():
         lines.append(f"{side} hand: {len(paths)} joints added, as of {result['fingers_from']}")
@@ -236,7 +269,8 @@ def _text(result: dict[str, Any], verbose: bool) -> str:
         clips = {s["clip"] for s in hand["segments"]}
         seams = hand["seams"]
         lines.append(
-            f"{side} hand: {len(hand['segments'])} segments from {len(clips)} clips; largest "
+            f"{side} hand: {counted(len(hand['segments']), 'segment')} from "
+            f"{counted(len(clips), 'clip')}; largest "
             f"angular acceleration {seams['max_acceleration_deg_s2']:.0f} deg/s^2 at the seams, "
             f"{seams['max_acceleration_elsewhere_deg_s2']:.0f} elsewhere, "
             f"{seams['max_acceleration_captured_deg_s2']:.0f} in the library"

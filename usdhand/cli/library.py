@@ -6,7 +6,7 @@ import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -26,6 +26,9 @@ from usdhand.cli.common import (
 )
 from usdhand.errors import UsageError, UsdHandError
 from usdhand.formats.suffixes import READABLE
+
+if TYPE_CHECKING:
+    from usdhand.fill import LibraryClip, MotionLibrary
 
 COLUMNS = {"file", "label", "actor"}
 OUTPUTS = (".usd", ".usda", ".usdc")
@@ -56,7 +59,9 @@ def command() -> None:
 @click.option("--shortest", type=float, metavar="S", help="Shortest segment.")
 @click.option("--longest", type=float, metavar="S", help="Longest segment.")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option("--rebuild", is_flag=True, help="Read all clips again, changed or not.")
+@click.option(
+    "--rebuild", is_flag=True, help="Read all clips again, changed or not; labels are kept."
+)
 @map_option
 @report_option
 @force_option
@@ -80,8 +85,9 @@ def build(
     """Read clips with body and fingers into a library.
 
     A folder stands for all clips in it and in the folders below. Run again, it reads only what
-    changed and keeps labels that someone edited. A clip that cannot be used is reported and left
-    out. The library is a USD stage with a prim a clip.
+    changed and keeps labels that someone edited; clips of the old library that are not given any
+    more are removed and listed. A clip that cannot be used is reported and left out. The library
+    is a USD stage with a prim a clip.
 
     \b
     Examples:
@@ -99,8 +105,8 @@ def build(
     check_report(report, force)
     if output.exists() and not filling.is_library(output):
         raise OutputError(f"{output} exists and is no motion library; give another name.")
-    previous = filling.read_library(output) if output.exists() and not rebuild else None
-    segmentation = _segmentation(speed, shortest, longest, previous)
+    previous = _previous(output, rebuild, quiet)
+    segmentation = _segmentation(speed, shortest, longest, None if rebuild else previous)
     try:
         result = filling.build_library(
             paths,
@@ -108,6 +114,7 @@ def build(
             segmentation=segmentation,
             labels=_read_labels(labels) if labels else None,
             previous=previous,
+            rebuild=rebuild,
             maps=maps,
             jobs=jobs,
             progress=_progress,
@@ -121,6 +128,7 @@ def build(
         "read": result.read,
         "unchanged": result.unchanged,
         "labels_without_clip": list(result.unmatched),
+        "removed": [{"path": x.path, "label": x.label, "actor": x.actor} for x in result.removed],
     }
     settings: dict[str, Any] = {"jobs": jobs, "labels": labels, "rebuild": rebuild, "maps": maps}
     settings["segmentation"] = asdict(result.library.segmentation)
@@ -133,6 +141,8 @@ def build(
         warn(f"{entry.path} of the old library cannot be used: {entry.reason}", quiet)
     for left in result.library.left_out:
         warn(f"left out: {left.path}: {left.reason}", quiet)
+    if result.removed:
+        warn(_what_is_removed(result.removed), quiet)
     if result.unmatched:
         some = ", ".join(result.unmatched[:3]) + (", ..." if len(result.unmatched) > 3 else "")
         warn(f"{labels}: {len(result.unmatched)} rows match no clip: {some}", quiet)
@@ -205,6 +215,38 @@ def _files(arguments: Sequence[str]) -> list[Path]:
 
 def _hidden(path: Path) -> bool:
     return any(part.startswith(".") for part in path.parts)
+
+
+def _previous(output: Path, rebuild: bool, quiet: bool) -> MotionLibrary | None:
+    """The library that is built again; of one that cannot be read, --rebuild needs nothing."""
+    from usdhand.api import filling
+    from usdhand.errors import InputError
+
+    if not output.exists():
+        return None
+    try:
+        return filling.read_library(output)
+    except InputError as error:
+        if not rebuild:
+            raise
+        warn(f"labels and actors of the old library are lost: {error}", quiet)
+        return None
+
+
+def _what_is_removed(clips: Sequence[LibraryClip]) -> str:
+    """Say which clips of the old library were not given; work of a person in full."""
+    from usdhand.api.libraries import is_edited
+    from usdhand.report.filling import counted, listed
+
+    text = (
+        f"{counted(len(clips), 'clip')} of the old library removed, since not given this time: "
+        + listed([clip.path for clip in clips])
+    )
+    edited = [clip for clip in clips if is_edited(clip) or clip.actor]
+    if edited:
+        words = (f"{x.path}: {x.label}" + (f" ({x.actor})" if x.actor else "") for x in edited)
+        text += "\n  with labels of their own: " + ", ".join(words)
+    return text
 
 
 def _what_is_kept(output: Path) -> str:

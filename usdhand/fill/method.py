@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -132,6 +131,7 @@ def fill(
         tuple(sorted(changed)),
         {side: names for side, names in missing.items() if names},
         tuple(library.clips[i].name for i in own),
+        {s: names for s in wanted if (names := _set_aside(library, joints[s], s, own))},
         settings,
     )
 
@@ -148,14 +148,38 @@ def _moves(channels: Channels, hands: Hands, side: Side) -> bool:
 def _shared_joints(
     library: MotionLibrary, hands: Hands, side: Side, own: Sequence[int]
 ) -> tuple[str, ...]:
-    """The body's hand joints that a clip has which is not its own: the most, of the most clips."""
-    body = hands.frames[side].names
-    counts = Counter(
-        tuple(joint for joint in body if joint in clip.hands[side].joints)
+    """The body's hand joints to fill: many, of many segments that are not its own.
+
+    A clip can be used if it has all of them, so more joints mean fewer segments. A joint more is
+    worth the more, the fewer segments it costs, and of many segments one can spare some: the number
+    of joints times the logarithm of the number of segments is largest.
+    """
+    names = hands.frames[side].names
+    rigs: dict[frozenset[str], int] = {}
+    for i, clip in enumerate(library.clips):
+        if i not in own and side in clip.hands:
+            rig = frozenset(names) & frozenset(clip.hands[side].joints)
+            rigs[rig] = rigs.get(rig, 0) + len(clip.hands[side].segments)
+
+    def worth(joints: frozenset[str]) -> tuple[float, int]:
+        count = sum(n for rig, n in rigs.items() if joints <= rig)
+        return len(joints) * float(np.log1p(count)), len(joints)
+
+    choices = {a & b for a in rigs for b in rigs} | {frozenset(names).intersection(*rigs)}
+    ranked = sorted((joints for joints in choices if worth(joints)[0] > 0), key=sorted)
+    best = max(ranked, key=worth, default=frozenset())
+    return tuple(joint for joint in names if joint in best)
+
+
+def _set_aside(
+    library: MotionLibrary, joints: tuple[str, ...], side: Side, own: Sequence[int]
+) -> tuple[str, ...]:
+    """Names of clips of a hand that are not used since they lack some of its joints."""
+    return tuple(
+        clip.name
         for i, clip in enumerate(library.clips)
-        if i not in own and side in clip.hands and clip.hands[side].segments
+        if i not in own and side in clip.hands and not set(joints) <= {*clip.hands[side].joints}
     )
-    return max(counts, key=lambda joints: (len(joints), counts[joints]), default=())
 
 
 def _usable_clips(

@@ -72,8 +72,9 @@ class Filled:
     kept : hands whose own finger motion was kept, since it moves
     without : hands that the library has no motion for
     changed : joints of the skeleton that were filled
-    missing : hand joints that the library has no motion for; they were kept
+    missing : hand joints that no clip that was used has; they were kept
     left_out : names of library clips that were not used, since they are the body's own
+    set_aside : names of library clips that were not used, since they lack joints that were filled
     """
 
     clips: tuple[Clip, ...]
@@ -83,4 +84,5 @@ class Filled:
     changed: tuple[int, ...] = ()
     missing: Mapping[Side, tuple[str, ...]] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    set_aside: Mapping[Side, tuple[str, ...]] = field(default_factory=dict)
     settings: FillSettings = field(default_factory=FillSettings)

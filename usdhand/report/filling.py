@@ -20,6 +20,19 @@ from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
 from usdhand.report.document import rounded
 
+LISTED = 3  # names that a message shows before it says "and N more"
+
+
+def counted(count: int, noun: str) -> str:
+    """Say a number and what it counts: 1 clip, 2 clips."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Show the first few names, and how many more there are."""
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(names[:LISTED]) + more
+
 
 def library_result(library: MotionLibrary, gone: Sequence[str] = ()) -> dict[str, Any]:
     """Everything `library info` shows; ``gone`` are clips whose file is not there."""
@@ -64,6 +77,7 @@ def fill_result(filled: Filled, library: MotionLibrary, body: Clip) -> dict[str,
         "without": list(filled.without),
         "missing": {side: list(joints) for side, joints in filled.missing.items()},
         "left_out": list(filled.left_out),
+        "set_aside": {side: list(names) for side, names in filled.set_aside.items()},
         "fps": rounded(body.fps),
         "frames": len(body),
     }

@@ -106,9 +106,13 @@ def read_library(path: str | Path) -> MotionLibrary:
     root = stage.GetPrimAtPath(ROOT)
     version = root.GetAttribute("usdhand:libraryVersion").Get() if root else None
     if version != VERSION:
-        found = "no motion library" if version is None else f"a library of version {version}"
+        if version is None:
+            raise InputError(
+                f"{path} is no motion library; 'usdhand library build CLIP... -o LIBRARY' makes one."
+            )
         raise InputError(
-            f"{path} is {found}; 'usdhand library build CLIP... -o LIBRARY' makes one."
+            f"{path} is a library of version {version}, this is for version {VERSION}; "
+            f"'usdhand library build CLIP... -o {path} --rebuild' makes it anew."
         )
     clips: list[LibraryClip] = []
     damaged: list[Left] = []
@@ -121,7 +125,8 @@ def read_library(path: str | Path) -> MotionLibrary:
     if damaged and not clips:
         raise InputError(
             f"{path}: none of its {len(damaged)} clips can be used ({damaged[0].path}: "
-            f"{damaged[0].reason}); build the library again."
+            f"{damaged[0].reason}); "
+            f"'usdhand library build CLIP... -o {path} --rebuild' makes it anew."
         )
     left = stage.GetPrimAtPath(LEFT_OUT)
     left_out = [
