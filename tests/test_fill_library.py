@@ -245,7 +245,7 @@ def edit_prim(library: Path, name: str, value: object) -> None:
 
 def test_a_library_of_another_version_is_refused(library: Path) -> None:
     edit_prim(library, ".usdhand:libraryVersion", 99)
-    with pytest.raises(InputError, match="version 99.*--rebuild"):
+    with pytest.raises(InputError, match=r"version 99.*--rebuild"):
         filling.read_library(library)
     gesture = library.parent / "gestures" / "ok_01.usdc"
     again = library.with_name("again.usdc")

@@ -218,7 +218,7 @@ def _row_of(path: Path, labels: Mapping[str, tuple[str, str]]) -> str:
 
 
 def _words(path: Path, given: tuple[str, str] | None, old: LibraryClip | None) -> tuple[str, str]:
-    """Label and actor: from a table, else as someone edited them before, else by the file's name."""
+    """Label and actor: from a table, else as someone edited them, else by the name."""
     actor = old.actor if old else ""
     if given:
         return given[0], given[1] or actor

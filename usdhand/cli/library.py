@@ -60,7 +60,7 @@ def command() -> None:
 @click.option("--longest", type=float, metavar="S", help="Longest segment.")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
 @click.option(
-    "--rebuild", is_flag=True, help="Read all clips again, changed or not; labels are kept."
+    "--rebuild", is_flag=True, help="Read all clips again; labels are kept."
 )
 @map_option
 @report_option

@@ -108,7 +108,8 @@ def read_library(path: str | Path) -> MotionLibrary:
     if version != VERSION:
         if version is None:
             raise InputError(
-                f"{path} is no motion library; 'usdhand library build CLIP... -o LIBRARY' makes one."
+                f"{path} is no motion library; "
+                "'usdhand library build CLIP... -o LIBRARY' makes one."
             )
         raise InputError(
             f"{path} is a library of version {version}, this is for version {VERSION}; "
