@@ -222,6 +222,25 @@ def module(name: str) -> ModuleType:
     return found
 
 
+def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
+    rig_file = module("rig_file")
+    missing = tmp_path / "none.usda"
+    with pytest.raises(rig_file.RigError, match=r"none\.usda: no such file"):
+        rig_file.read_rigs(str(missing))
+    missing.write_text("no USD")
+    with pytest.raises(rig_file.RigError, match="cannot be read as USD"):
+        rig_file.read_rigs(str(missing))
+    rig = tmp_path / "rig.usda"
+    reduced(api.read_clip(SAMPLES / "gestures" / "ok_02.usdc"), rig)
+    [found] = rig_file.read_rigs(str(rig))
+    edited = {c.name: c for c in found.free[:1]}
+    with pytest.raises(rig_file.RigError, match="no such folder to write edited"):
+        rig_file.write_edits(str(rig), found.path, str(tmp_path / "new" / "edited.usda"), edited)
+    assert not (tmp_path / "new").exists()
+    rig_file.write_edits(str(rig), found.path, str(tmp_path / "edited.usda"), edited)
+    assert len(rig_file.read_rigs(str(tmp_path / "edited.usda"))) == 1
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("ball", [False, True])
 def test_expressions_are_the_rotations_of_channels(side: str, ball: bool) -> None:

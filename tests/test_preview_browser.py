@@ -326,6 +326,12 @@ def test_a_lane_that_is_over_says_so(pages: Pages, tmp_path: Path) -> None:
     page.page.fill("#scrub", str(clips[1 - short].duration))
     page.settle()
     assert grey() == [i == short for i in (0, 1)]
+    over = page.page.evaluate("""async () => {
+      const { laneEnded } = await import('playback');
+      const lane = { fps: 30, duration: 2, retime: { left: [[0, 0], [1, 2], [3, 2]] } };
+      return [0.9, 1.01, 1.1, 2.9].map((time) => laneEnded(lane, time, 'left'));
+    }""")
+    assert over == [False, False, True, True]
     # The time code is that of the first lane that is shown, as long as it plays.
     codes = [float(c.time_codes[-1]) for c in clips]
     for shown in (0, 1):

@@ -54,10 +54,12 @@ def make_fill(folder: Path, page: Path) -> None:
     """A page of a filled body beside the true fingers."""
     clips = sorted((SAMPLES / "gestures").glob("*.usdc"))
     library = filling.build_library(clips, folder / "library.usdc").library
-    body = api.read_clip(SAMPLES / "conversations" / "talk_01_body.usdc")
+    taken = SAMPLES / "conversations" / "talk_01_body.usdc"
+    body = api.read_clip(taken)
     filled = filling.fill_fingers(body, library)
     filling.write_filled(filled, folder / "filled.usdc")
-    report = document("fill", [], {}, fill_result(filled, library, body))
+    report = document("fill", [taken], {}, fill_result(filled, library, body))
+    report["output"] = str(folder / "filled.usdc")
     (folder / "fill.json").write_text(dumps(report), encoding="utf-8")
     files = [folder / "filled.usdc", TALK]
     write_preview(preview_clips(files, reports=[folder / "fill.json"]), page)

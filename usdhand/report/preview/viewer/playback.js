@@ -63,7 +63,10 @@ export class Playback {
 /** Whether a lane shows nothing of its own at a time of the page, since its motion is over. */
 export function laneEnded(lane, time, side) {
   const warp = lane.retime[side] ?? lane.retime.right ?? lane.retime.left;
-  return time > (warp ? warp[warp.length - 1][0] : lane.duration) + 0.5 / lane.fps;
+  // Where the other clip goes on, a hand clip that is over stands still.
+  const last = warp && warp[warp.length - 1][1];
+  const end = warp ? warp.find(([, seconds]) => seconds >= last)[0] : lane.duration;
+  return time > end + 0.5 / lane.fps;
 }
 
 /** Seconds of a lane's own clip at a time of the page, for the hand that is looked at. */
