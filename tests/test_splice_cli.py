@@ -114,7 +114,8 @@ def test_dry_run_writes_nothing(run: Run, tmp_path: Path) -> None:
         (("--pin", "nan:1"), "'nan:1' is no pin"),
         (("--band", "0.3"), "two numbers"),
         (("--band", "0,2"), "above 0"),
-        ((), "beyond the band"),
+        ((), "more than a factor of 3.3 apart"),
+        (("--hands-skel", "foo"), "--hands-skel foo matches no"),
     ],
 )
 def test_refused_with_a_reason(
@@ -129,6 +130,7 @@ def test_refused_with_a_reason(
 def test_pins_are_read_in_the_time_codes_of_their_clips() -> None:
     body, hands = read_clip(BODY), read_clip(HANDS)
     pin = parse_pin("left:31:121:6", body, hands)
+    assert parse_pin("LEFT:31:121:6", body, hands).side == "left"
     assert (pin.side, pin.body, pin.hand) == ("left", pytest.approx(1.0), pytest.approx(2.0))
     assert pin.tolerance == pytest.approx(0.1)
     assert str(pin) == "left:31:121:6"
@@ -149,7 +151,7 @@ def test_a_clip_that_shows_a_part_is_refused_with_the_pins_that_place_it(
 ) -> None:
     out = tmp_path / "talk.usda"
     message = str(run(BODY, HANDS, "-o", out, code=2).exception)
-    assert "beyond the band" in message
+    assert "more than a factor of 3.3 apart" in message
     pins = message.rpartition("give ")[2].split()
     run(BODY, HANDS, *pins, "-o", out)
     clip, true = read_clip(out), read_clip(FULL)
@@ -196,8 +198,74 @@ def test_long_differences_are_worth_a_warning() -> None:
     body, hands = read_clip(BODY), read_clip(HANDS)
     result = splice_hands(body, hands, pins=["1:1", "451:403"])
     assert any("Between the pins 1:1 and 451:403" in note for note in result.notes)
-    assert not splice_hands(body, hands, pins=["1:1", "181:403"]).notes
+    [note] = splice_hands(body, hands, pins=["1:1", "181:403"]).notes
+    assert "the hand clip ends at time code 181 of the body" in note
+    assert "(left and right)" in note
+    [note] = splice_hands(body, hands, pins=["481:1", "680:403"]).notes
+    assert "the hand clip begins at time code 481 of the body" in note
     with pytest.raises(UsageError, match="not spliced"):
         splice_hands(body, read_clip(RIGHT), pins=["left:1:1"])
     with pytest.raises(UsageError, match="trunk"):
         splice_hands(body, hands, SpliceSettings(align="trunk"), pins=["1:1", "181:403"])
+
+
+def test_lengths_decide_whatever_the_band() -> None:
+    """Of a long body, clips of a few frames are refused as well; a wider band refuses nothing."""
+    body, full = read_clip(BODY), read_clip(FULL)
+    for count in (10, 27):
+        with pytest.raises(UsageError, match=r"factor of 3\.3 apart"):
+            splice_hands(body, frames(full, slice(0, count)))
+    ours, theirs = (read_clip(SAMPLES / "gestures" / f"ok_0{k}.usdc") for k in (1, 2))
+    for band in (0.05, 0.3, 1.0):
+        assert splice_hands(ours, theirs, SpliceSettings(band=(band, 0.1))).hands
+
+
+def test_fingers_that_do_not_move(run: Run, tmp_path: Path) -> None:
+    """Swapped clips are refused, one still hand is told, and so is the same file twice."""
+    out = tmp_path / "o.usda"
+    message = str(run(FULL, BODY, "-o", out, code=3).exception)
+    assert "No finger moves in the hand clip" in message
+    assert "swapped" in message
+    full = read_clip(FULL)
+    left = find_hands(full).frames["left"].joints
+    rotations = full.rotations.copy()
+    rotations[:, left] = rotations[:1, left]
+    [note] = splice_hands(full, full.with_rotations(rotations)).notes
+    assert "the fingers of the left hand do not move in the hand clip" in note
+    assert "replace moving ones" in note
+    assert "are the same" in run(FULL, FULL, "-o", out, "-n").output
+
+
+def test_exact_pins_hold_for_the_pose() -> None:
+    """A hold and a jump by pins: at pinned frames the pose is the hand clip's, not a mean."""
+    full = read_clip(FULL)
+    shown = np.minimum(np.arange(len(full)), 100)
+    shown[200:] = np.arange(200, len(full))
+    at = np.arange(60, 260, 2)
+    pins = [f"{k + 1}:{shown[k] + 1}" for k in at]
+    hands = find_hands(full)
+    result = splice_hands(full, full, SpliceSettings(wrist="hands"), pins=pins)
+    got, true = hands.encode(result.clip).values[at], hands.encode(full).values[shown[at]]
+    assert np.abs(got - true).max() < 0.05
+
+
+def test_pins_tell_the_timing_of_arms_that_rest() -> None:
+    full = read_clip(FULL)
+    hands = find_hands(full)
+    fingers = [j for f in hands.frames.values() for j in f.joints]
+    rotations = np.repeat(full.rotations[:1], len(full), axis=0)
+    rotations[:, fingers] = full.rotations[:, fingers]
+    still = full.with_rotations(rotations)
+    with pytest.raises(InputError, match=r"nothing tells .* Pins can"):
+        splice_hands(full, still, pins=["300:300"])
+    result = splice_hands(full, still, pins=["1:1", "300:350", "680:680"])
+    assert any("the timing is that of the pins" in note for note in result.notes)
+    for alignment in result.hands.values():
+        assert np.interp(299 / 30, *alignment.warp.T) == pytest.approx(349 / 30)
+    one = splice_hands(full, still, pins=["left:1:1", "left:680:680"])
+    assert one.hands["right"].taken_from == "left"
+
+
+def frames(clip: Clip, part: slice) -> Clip:
+    q, t, s = (v[part] for v in (clip.rotations, clip.translations, clip.scales))
+    return replace(clip, rotations=q, translations=t, scales=s)

@@ -54,7 +54,7 @@ def parse_pin(text: str, body: Clip, hands: Clip) -> Pin:
     The tolerance is in time codes of the hand clip; without one the pin is exact.
     """
     first, _, rest = text.partition(":")
-    side = next((s for s in SIDES if s == first.strip()), None)
+    side = next((s for s in SIDES if s == first.strip().lower()), None)
     try:
         numbers = [float(part) for part in (rest if side else text).split(":")]
     except ValueError:

@@ -23,7 +23,6 @@ from usdhand.cli.common import (
     side_option,
     sides,
     skel_option,
-    verbose_option,
     warn,
     warn_of,
     write_plots,
@@ -79,7 +78,7 @@ if TYPE_CHECKING:
 @force_option
 @json_option
 @quiet_option
-@verbose_option
+@click.option("-v", "--verbose", is_flag=True, help="Print every phase.")
 def command(
     body: Path,
     hands: Path,
@@ -117,6 +116,7 @@ def command(
     """
     from usdhand import api
     from usdhand.api import splicing
+    from usdhand.errors import UsdHandError
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps
@@ -129,14 +129,20 @@ def command(
     check_report(report, force)
     check_plots(plots, plotting.NAMES, force)
     conventions = api.conventions_from(maps)
-    clip, hand_clip = api.read_clip(body, skel), api.read_clip(hands, hands_skel)
+    clip = api.read_clip(body, skel)
+    try:
+        hand_clip = api.read_clip(hands, hands_skel)
+    except UsdHandError as error:
+        raise type(error)(str(error).replace("--skel", "--hands-skel")) from error
+    if body.resolve() == hands.resolve() and skel == hands_skel:
+        warn(f"{body}: body and hand clip are the same", quiet)
     warn_of(clip, quiet)
     warn_of(hand_clip, quiet)
     spliced = splicing.splice_hands(
         clip, hand_clip, settings, pins=pins, sides=sides(side), conventions=conventions
     )
     for note in spliced.notes:
-        warn(f"{body}: {note}", quiet)
+        warn(f"{body} with {hands}: {note}", quiet)
     if not dry_run:
         splicing.write_spliced(
             spliced,

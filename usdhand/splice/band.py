@@ -83,8 +83,9 @@ def checked_pins(pins: Sequence[Pin], side: Side, body: float, hand: float) -> t
             if pin.tolerance < before.tolerance:
                 kept[-1] = pin
             continue
-        if before and pin.hand < before.hand - 1e-9:
-            raise UsageError(f"Pins {before} and {pin} cross: the hand clip would run backward.")
+        latest = max(kept, key=lambda p: p.hand - p.tolerance, default=pin)
+        if pin.hand + pin.tolerance < latest.hand - latest.tolerance - 1e-9:
+            raise UsageError(f"Pins {latest} and {pin} cross: the hand clip would run backward.")
         kept.append(pin)
     return tuple(kept)
 
@@ -100,8 +101,17 @@ def anchors_of(pins: Sequence[Pin], rows: int, columns: int, fps: float) -> tupl
         row = min(round(pin.body * fps), rows - 1)
         column = min(round(pin.hand * fps), columns - 1)
         found[row] = (row, column, 0 if row in (0, rows - 1) else int(pin.tolerance * fps))
-    ordered = [found[row] for row in sorted(found)]
-    return tuple(ordered)
+    ordered = tuple(found[row] for row in sorted(found))
+    return ordered if all(a[1] <= b[1] for a, b in pairwise(ordered)) else _in_order(ordered)
+
+
+def _in_order(anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
+    """Anchors that cross within their tolerances, narrowed to what a path can pass in order."""
+    at, middle, slack = np.array(anchors).T
+    low = np.maximum.accumulate(middle - slack)
+    high = np.maximum(np.minimum.accumulate((middle + slack)[::-1])[::-1], low)
+    narrowed = zip(at, (low + high) // 2, (high - low) // 2, strict=True)
+    return tuple((int(row), int(column), int(tolerance)) for row, column, tolerance in narrowed)
 
 
 def pinned_band(anchors: Sequence[Anchor], width: float) -> Band:

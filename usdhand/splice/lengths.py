@@ -12,9 +12,10 @@ from usdhand.splice.band import Pin
 from usdhand.splice.markers import hand_markers
 from usdhand.splice.place import RATE, place
 
-# Parts whose lengths differ by more than this factor are worth a warning.
-UNLIKELY_FACTOR = 2.0
-# Parts of less seconds than this are where a clip has not begun yet, or has ended.
+# Parts whose lengths differ by more than this factor are worth a warning; clips that begin or end
+# together, and differ by more than that one, are not of one performance.
+UNLIKELY_FACTOR, MOST_FACTOR = 2.0, 3.3
+# Beside a pin, parts of less seconds than this are where a clip has not begun yet, or has ended.
 LEAST_PART_S = 1.0
 # Beyond this many cells, the way back alone would need a gigabyte.
 MOST_CELLS = 4 * 2**30
@@ -37,7 +38,7 @@ def checked_lengths(
     InputError
         if a clip has less than three frames.
     UsageError
-        if lengths are beyond the band where no pin says that they should be.
+        if lengths are too different where no pin says that they should be.
     """
     for name, clip in (("body", body), ("hand", hand_clip)):
         if len(clip) < 3:
@@ -56,10 +57,12 @@ def checked_lengths(
             shorter, longer = sorted(lasts)
             where = _part(one if one is not start else None, other if other is not end else None)
             lengths = f"{where}the body lasts {lasts[0]:.2f} s, the hand clip {lasts[1]:.2f} s"
-            if shorter < LEAST_PART_S:
+            if own and shorter < LEAST_PART_S:
                 continue
-            if longer > shorter / band and (one is start or other is end):
-                raise UsageError(f"{_sentence(lengths)}, beyond the band of {band:g}. {advice()}")
+            if longer > MOST_FACTOR * shorter and (one is start or other is end):
+                raise UsageError(
+                    f"{_sentence(lengths)}, more than a factor of {MOST_FACTOR:g} apart. {advice()}"
+                )
             if longer > UNLIKELY_FACTOR * shorter:
                 note = f"{_sentence(lengths)}, more than a factor of {UNLIKELY_FACTOR:g} apart"
                 if one is start or other is end:

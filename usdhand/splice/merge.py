@@ -22,13 +22,19 @@ JOLT_FRAMES = 2.0
 
 
 def with_fingers(
-    body: Clip, hand_clip: Clip, frames: HandFrames, hand_frames: HandFrames, warp: Array
+    body: Clip,
+    hand_clip: Clip,
+    frames: HandFrames,
+    hand_frames: HandFrames,
+    warp: Array,
+    exact: Array | None = None,
 ) -> tuple[Clip, tuple[str, ...]]:
     """The body with the fingers that the hand clip has at the warp's times.
 
     Parameters
     ----------
     warp : (body frames,) seconds of the hand clip from its first frame
+    exact : (body frames,) whether a frame shows this very moment, and nothing of those around it
 
     Returns
     -------
@@ -38,15 +44,21 @@ def with_fingers(
     own, other = encode(body, frames), encode(hand_clip, hand_frames)
     theirs = frozenset(other.names)
     names = tuple(name for name in own.names if name in theirs)
-    times = _times_within(warp) * hand_clip.fps
+    times = _times_within(warp, exact) * hand_clip.fps
     curves = other.select(names).values
     taken = np.mean([interpolate(curves, t) for t in times], axis=0)
-    taken = _without_jolts(taken, warp)
+    taken = _without_jolts(taken, warp, exact)
     return decode(own.replaced(Channels(names, taken)), body, frames), names
 
 
 def with_wrist(
-    body: Clip, hand_clip: Clip, hands: Hands, hand_hands: Hands, side: Side, warp: Array
+    body: Clip,
+    hand_clip: Clip,
+    hands: Hands,
+    hand_hands: Hands,
+    side: Side,
+    warp: Array,
+    exact: Array | None = None,
 ) -> Clip:
     """The body with the hand clip's rotation of the palm relative to the forearm.
 
@@ -63,7 +75,7 @@ def with_wrist(
                 "forearm, so nothing tells how it bends. Splice the fingers alone (--wrist body)."
             )
     bends = _palm_to_forearm(hand_clip, hand_hands, side)
-    times = _times_within(warp) * hand_clip.fps
+    times = _times_within(warp, exact) * hand_clip.fps
     taken = rot.mean(np.stack([interpolate_rotations(bends, t) for t in times]))
     taken = rot.make_continuous(taken)
     wrist = hands.character.hands[side].wrist
@@ -103,22 +115,25 @@ def _palm_to_forearm(clip: Clip, hands: Hands, side: Side) -> Array:
     return rot.make_continuous(rot.multiply(rot.conjugate(forearm), palm))
 
 
-def _times_within(warp: Array) -> Array:
+def _times_within(warp: Array, exact: Array | None) -> Array:
     """(3, frames) times of the hand clip that fall on every body frame.
 
     The average over several matched frames is the paper's median for what varies smoothly.
     """
     frames = np.arange(len(warp))
-    return np.stack([np.interp(frames + w, frames, warp) for w in WITHIN_FRAME])
+    times = np.stack([np.interp(frames + w, frames, warp) for w in WITHIN_FRAME])
+    return times if exact is None else np.where(exact, warp, times)
 
 
-def _without_jolts(curves: Array, warp: Array) -> Array:
-    """Curves smoothed where, and only where, the speed of the warp jumps."""
+def _without_jolts(curves: Array, warp: Array, exact: Array | None) -> Array:
+    """Curves smoothed where, and only where, the speed of the warp jumps at no exact pin."""
     bend = np.abs(np.diff(warp, n=2, prepend=warp[:1], append=warp[-1:]))
     bend[[0, -1]] = 0.0
     usual = max((warp[-1] - warp[0]) / max(len(warp) - 1, 1), 1e-9)
     jolts = (bend > JOLT * usual).astype(np.float64)
     if not jolts.any():
         return curves
-    share = np.minimum(1.0, 6.0 * smoothed(jolts, JOLT_FRAMES))[:, None]
-    return np.asarray(curves + share * (smoothed(curves, JOLT_FRAMES) - curves))
+    share = np.minimum(1.0, 6.0 * smoothed(jolts, JOLT_FRAMES))
+    if exact is not None:
+        share = np.where(exact, 0.0, share)
+    return np.asarray(curves + share[:, None] * (smoothed(curves, JOLT_FRAMES) - curves))

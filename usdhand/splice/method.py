@@ -20,6 +20,7 @@ from usdhand.splice.band import (
     checked_pins,
     pinned_band,
 )
+from usdhand.splice.fingers import held_poses, moving_fingers
 from usdhand.splice.lengths import checked_lengths, pin_advice
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.merge import with_fingers, with_wrist
@@ -139,7 +140,8 @@ def splice(
     HandNotFoundError
         if the clips have no hand, or no finger joint of one, in common.
     InputError
-        if no hand moves, so that there is nothing to align.
+        if no hand moves, so that there is nothing to align, and pins do not tell either; if the
+        body's fingers move and none of the hand clip's do.
     UsageError
         if pins cannot hold, or the clips' lengths are too different.
     """
@@ -171,15 +173,17 @@ def splice(
         lambda: pin_advice(body, hand_clip, body_hands, hand_hands, sides),
     )
     found, more = _aligned_hands(body, hand_clip, body_hands, hand_hands, settings, pins)
-    notes += more
+    notes += more + moving_fingers(body, hand_clip, body_hands, hand_hands, sides)
     clip, hands = body, {}
     for side, alignment in found.items():
         warp = alignment.warp[:, 1]
+        exact = _exact_frames(alignment)
         if settings.wrist == "hands":
-            clip = with_wrist(clip, hand_clip, body_hands, hand_hands, side, warp)
+            clip = with_wrist(clip, hand_clip, body_hands, hand_hands, side, warp, exact)
         frames, other = body_hands.frames[side], hand_hands.frames[side]
-        clip, names = with_fingers(clip, hand_clip, frames, other, warp)
+        clip, names = with_fingers(clip, hand_clip, frames, other, warp, exact)
         hands[side] = replace(alignment, channels=names)
+    notes += held_poses(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
     return Spliced(clip, hands, tuple(notes))
 
 
@@ -215,6 +219,16 @@ def align(
     first = through_pins(first / hand.fps, own_times, pins) * hand.fps
     second = refined(body, hand, first, np.minimum(room * hand.fps, reach), settings.align, tether)
     return in_time(second), in_time(first), path.cost
+
+
+def _exact_frames(alignment: Alignment) -> Array:
+    """Which frames of the body an exact pin is on."""
+    times = alignment.warp[:, 0]
+    at = np.array([p.body for p in alignment.pins if p.tolerance == 0]) / times[1]
+    frames = np.rint(at).astype(np.intp)
+    exact = np.zeros(len(times), bool)
+    exact[frames[np.abs(at - frames) < 1e-3]] = True
+    return exact
 
 
 def _room(times: Array, pins: Sequence[Pin]) -> Array:
@@ -261,6 +275,12 @@ def _aligned_hands(
         for side, own in pins.items()
         if side not in still
     }
+    notes = []
+    if not found:
+        ends = body.duration, hand_clip.duration
+        found = {s: _as_pinned(*markers[s], p, times) for s, p in pins.items() if _fix(p, *ends)}
+        if found:
+            notes.append("no hand moves: the timing is that of the pins, and even between them")
     if not found:
         clips = {f"the body {body.name}": 0, f"the hand clip {hand_clip.name}": 1}
         at_rest = [
@@ -270,13 +290,17 @@ def _aligned_hands(
         ]
         where = " and ".join(at_rest) or f"both {body.name} and {hand_clip.name}"
         raise InputError(
-            f"No hand moves in {where}, so nothing tells which moments belong together."
+            f"No hand moves in {where}, so nothing tells which moments belong together. Pins can: "
+            "--pin where the clips begin, where they end, and between."
         )
-    notes = []
-    for side in still:
+    for side in (s for s in still if s not in found):
         [(moving, alignment)] = found.items()
         found[side] = _following(alignment, moving, pins[side], times)
-        notes.append(f"the {side} hand hardly moves: it follows the {moving} one")
+        body_rests, hand_rests = (_reach(m, settings.smoothing) < enough for m in markers[side])
+        where = "the hand clip" if not body_rests else "both clips" if hand_rests else "the body"
+        notes.append(
+            f"the {side} hand hardly moves in {where}: it follows the timing of the {moving} one"
+        )
     return {side: found[side] for side in pins}, notes
 
 
@@ -295,6 +319,22 @@ def _aligned(
         phase_qualities(ours, theirs, warp, settings.smoothing),
         (ours.origin, theirs.origin),
     )
+
+
+def _fix(pins: Sequence[Pin], body: float, hand: float) -> bool:
+    """Whether pins say where one of the clips begins and where one ends."""
+    if len(pins) < 2:
+        return False
+    first, last = pins[0], pins[-1]
+    begin = min(first.body, first.hand)
+    return begin < 1e-3 and min(body - last.body, hand - last.hand) < 1e-3
+
+
+def _as_pinned(ours: Markers, theirs: Markers, pins: tuple[Pin, ...], times: Array) -> Alignment:
+    """Alignment by pins alone, evenly between them."""
+    warp = np.interp(times, [p.body for p in pins], [p.hand for p in pins])
+    joint = np.stack([times, warp], axis=1)
+    return Alignment(joint, warp, pins, 0.0, (), (ours.origin, theirs.origin))
 
 
 def _reach(markers: Markers, smoothing: float) -> float:

@@ -1,0 +1,74 @@
+"""What is odd about the fingers of two clips: they do not move, or the hand clip has no more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from usdhand.anatomy import HandFrames, Hands, Side
+from usdhand.anatomy.channels import encode
+from usdhand.errors import InputError
+from usdhand.motion import Clip
+from usdhand.motion.rotations import Array
+
+# Fingers none of whose channels changes by as many degrees do not move.
+STILL_DEG = 2.0
+# The last pose of a hand clip that stays for as many seconds is worth a note.
+HELD_S = 0.5
+
+
+def moving_fingers(
+    body: Clip, hand_clip: Clip, body_hands: Hands, hand_hands: Hands, sides: Sequence[Side]
+) -> list[str]:
+    """Notes on hands whose fingers do not move in the hand clip.
+
+    Raises
+    ------
+    InputError
+        if none do, and fingers of the body move: then the clips are swapped, or the wrong ones.
+    """
+    still = [s for s in sides if not _move(hand_clip, hand_hands.frames[s])]
+    lost = [s for s in still if _move(body, body_hands.frames[s])]
+    if lost and len(still) == len(sides):
+        raise InputError(
+            f"No finger moves in the hand clip {hand_clip.name}, but fingers of the body "
+            f"{body.name} do, and would be lost. Are the clips swapped? The body comes first."
+        )
+    notes = []
+    for side in still:
+        note = f"the fingers of the {side} hand do not move in the hand clip {hand_clip.name}"
+        notes.append(note + (", and replace moving ones of the body" if side in lost else ""))
+    return notes
+
+
+def held_poses(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) -> list[str]:
+    """Notes on hands that hold the hand clip's first or last pose for long.
+
+    Parameters
+    ----------
+    warps : (body frames,) seconds of the hand clip
+    """
+    least = HELD_S * body.fps
+    held: dict[str, list[Side]] = {}
+    for side, warp in warps.items():
+        before = int(np.searchsorted(warp, 1e-6, "right"))
+        after = int(np.searchsorted(warp, hand_clip.duration - 1e-6))
+        if before > least:
+            at = _time_code(body, before - 1)
+            text = f"begins at time code {at:g} of the body, fingers hold its first pose until then"
+            held.setdefault(text, []).append(side)
+        if len(body) - after > least:
+            at = _time_code(body, after)
+            text = f"ends at time code {at:g} of the body, fingers hold its last pose from there on"
+            held.setdefault(text, []).append(side)
+    return [f"the hand clip {text} ({' and '.join(s)})" for text, s in held.items()]
+
+
+def _move(clip: Clip, frames: HandFrames) -> bool:
+    values = encode(clip, frames).values
+    return bool(values.size and np.ptp(values, axis=0).max() > STILL_DEG)
+
+
+def _time_code(clip: Clip, frame: int) -> float:
+    return clip.origin.first_time_code + frame * clip.origin.time_codes_per_frame
