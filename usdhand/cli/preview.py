@@ -30,8 +30,8 @@ from usdhand.cli.common import (
     metavar="FILE",
     multiple=True,
     type=click.Path(path_type=Path),
-    help="JSON report of fill or splice: its segments, phases and pins are on the timeline; "
-    "repeatable.",
+    help="JSON report of fill or splice of one of the files: its segments, phases and pins are on "
+    "the timeline; repeatable.",
 )
 @click.option(
     "--figure",
