@@ -176,6 +176,11 @@ def test_limits_hold_and_results_repeat(body: Clip, library: MotionLibrary) -> N
         joints = [hands.frames[s].names for s in part.part]
         low, high = channel_limits(library, part.part, joints)
         curves = part.alternatives[0].curves
+        own = [
+            np.concatenate([c.hands[s].curves_of(j) for c in library.clips])
+            for s, j in zip(part.part, joints, strict=True)
+        ]
+        assert np.array_equal(low, np.concatenate([values.min(axis=0) for values in own]))
         assert (curves >= low - 1e-9).all()
         assert (curves <= high + 1e-9).all()
 
@@ -367,7 +372,56 @@ def test_both_hands_as_one_have_figures_of_their_own(library_file: Path, tmp_pat
 def test_a_body_without_motion(body: Clip, library: MotionLibrary) -> None:
     still = body.with_rotations(np.repeat(body.rotations[:1], len(body), axis=0))
     filled = filling.fill_fingers(still, library)
-    assert np.isfinite(filled.clips[0].rotations).all()
+    made = filled.clips[0].rotations
+    assert np.isfinite(made).all()
+    assert filled.still == SIDES
+    assert np.array_equal(made, np.repeat(made[:1], len(made), axis=0))
+    assert not np.array_equal(made[0], body.rotations[0])  # a pose of the library, not the body's
+    assert filling.fill_fingers(body, library).still == ()
+
+
+def damaged(source: Path, target: Path, joint: str, value: float) -> Path:
+    """A clip in one file, one of whose joints is far away from the twentieth frame on."""
+    layer = Usd.Stage.Open(str(source)).Flatten()
+    stage = Usd.Stage.Open(layer)
+    [prim] = [p for p in stage.Traverse() if p.IsA(UsdSkel.Skeleton)]
+    source_prim = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource()
+    anim = UsdSkel.Animation(source_prim)
+    place = [str(j).split("/")[-1] for j in anim.GetJointsAttr().Get()].index(joint)
+    attribute = anim.GetTranslationsAttr()
+    time = (attribute.GetTimeSamples() or [Usd.TimeCode.Default()])[-1]
+    values = list(attribute.Get(time))
+    values[place] = (value, 0.0, 0.0)
+    attribute.Set(values, time)
+    layer.Export(str(target))
+    return target
+
+
+@pytest.mark.parametrize("value", [1e30, 1e12])
+@pytest.mark.parametrize("joint", ["Hips", "LeftForeArm"])
+def test_clips_of_absurd_size_are_refused(tmp_path: Path, value: float, joint: str) -> None:
+    gestures = SAMPLES / "gestures"
+    bad = damaged(gestures / "ok_01.usdc", tmp_path / "bad_01.usdc", joint, value)
+    library, out = tmp_path / "l.usdc", tmp_path / "o.usda"
+    text = run("library", "build", bad, gestures / "ok_02.usdc", "-o", library).output
+    assert "left out: bad_01.usdc: joint " in text
+    assert f"{joint} is {value:.3g} cm from its parent" in text
+    assert [c.name for c in filling.read_library(library).clips] == ["ok_02"]
+    run("fill", BODY, "--library", library, "-o", out, "-q")
+    body = damaged(BODY, tmp_path / "body.usdc", joint, value)
+    text = run("fill", body, "--library", library, "-o", tmp_path / "n.usda", code=3).output
+    assert f"{body}: joint " in text
+    assert f"{joint} is {value:.3g} cm from its parent" in text
+
+
+def test_takes_with_still_fingers_are_no_truth(library_file: Path) -> None:
+    result = run("evaluate", library_file, "--takes", BODY, "--takes", FULL, "--json")
+    data = json.loads(result.stdout)
+    assert {take["take"] for take in data["takes"]} == {FULL.stem}
+    [left] = data["left_out"]
+    assert left["path"] == BODY.stem
+    assert "left and right fingers do not move" in left["reason"]
+    run("evaluate", library_file, "--takes", BODY, code=3)
 
 
 @pytest.mark.parametrize("wrong", ["nothing", "clip", "body is library"])

@@ -427,10 +427,12 @@ def test_body_only_bvh(library: Path, tmp_path: Path, name: str) -> None:
     """Motion without fingers of other formats: hands go on where the arms end, thumbs as theirs."""
     body = shared_data("bvh", "animated-drawings", f"{name}.bvh")
     out = tmp_path / "out.usda"
-    run("fill", body, "--library", library, "-o", out, "--add-fingers")
+    text = run("fill", body, "--library", library, "-o", out, "--add-fingers").output
     clip = api.read_clip(out)
     hands = api.find_hands(clip)
     for side in SIDES:
+        assert f"{side} hand: {'L' if side == 'left' else 'R'}" in text
+        assert "stays as it is beside the added thumb" in text
         frames, hand = hands.frames[side], hands.character.hands[side]
         assert len(frames.names) == 15
         assert hand.elbow is not None

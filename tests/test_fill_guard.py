@@ -138,6 +138,31 @@ def test_the_same_performance_on_a_body_of_other_proportions_is_left_out() -> No
     assert same_motion(library, {}, "2") == [1]
 
 
+@pytest.mark.parametrize("frames", [slice(0, 90), slice(150, 300), slice(400, 431)])
+def test_an_excerpt_is_the_same_performance(frames: slice) -> None:
+    """A piece of a take is told to be of it, and not of others; and the other way round."""
+    whole = [api.read_clip(TALKS / f"talk_0{i}_full.usdc") for i in (1, 2, 3)]
+    hands = api.find_hands(whole[0])
+
+    def piece(clip: Clip) -> Clip:
+        return replace(
+            clip,
+            rotations=clip.rotations[frames],
+            translations=clip.translations[frames],
+            scales=clip.scales[frames],
+        )
+
+    def arms(clip: Clip) -> dict[Side, ArmMotion]:
+        return {s: at_arm_rate(arm_motion(clip, hands, s), clip.fps) for s in hands.frames}
+
+    def library(clips: list[Clip]) -> MotionLibrary:
+        made = (library_clip(c, hands, Segmentation(), path="", content_hash="") for c in clips)
+        return MotionLibrary(tuple(made))
+
+    assert same_motion(library(whole), arms(piece(whole[0])), None) == [0]
+    assert same_motion(library([piece(c) for c in whole]), arms(whole[1]), None) == [1]
+
+
 @pytest.mark.real_data
 def test_the_same_takes_on_two_rigs() -> None:
     """Every take of the smaller rig is told to be one of the larger, and which."""

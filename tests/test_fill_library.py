@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
 from dataclasses import fields
 from pathlib import Path
 
@@ -160,6 +162,9 @@ def test_labels_from_a_table(folder: Path) -> None:
     table.write_text("file,label,colour\nok_01,circle,red\n")
     arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
     assert "unknown columns colour" in run(*arguments, "--labels", table, code=3).output
+    table.write_text("file;label;actor\nok_01;ring, small;Eve\n")
+    build(folder, "--labels", table)
+    assert words(folder / "library.usdc")["ok_01"] == ("ring, small", "Eve")
     table.write_text("name;label\nok_01;circle\n")
     assert "columns file and label" in run(*arguments, "--labels", table, code=3).output
 
@@ -168,6 +173,7 @@ def test_a_broken_clip_is_left_out(folder: Path) -> None:
     (folder / "gestures" / "broken_01.usdc").write_bytes(b"PXR-USDC nothing")
     text = run("library", "build", folder / "gestures", "-o", folder / "library.usdc").output
     assert "left out: gestures/broken_01.usdc" in text
+    assert text.count("broken_01.usdc") == 1
     read = filling.read_library(folder / "library.usdc")
     assert len(read.clips) == 4
     assert [x.path for x in read.left_out] == ["gestures/broken_01.usdc"]
@@ -272,6 +278,8 @@ def test_a_library_of_another_version_is_refused(library: Path) -> None:
         ("height", -170.0),
         ("fps", float("inf")),
         ("left:fingers", None),
+        ("left:fingers", [1e12] * 45),
+        ("left:arm", [1e30] * 35),
     ],
 )
 def test_a_damaged_clip_is_left_out_and_listed(library: Path, name: str, value: object) -> None:
@@ -359,6 +367,24 @@ def test_an_interruption_says_what_was_kept(folder: Path, monkeypatch: pytest.Mo
     arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
     text = run(*arguments, code=1).output
     assert "2 clips read so far are kept" in text
+    monkeypatch.undo()
+    assert build(folder)["read"] == 2
+
+
+def test_sigterm_is_an_interruption_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from usdhand.cli import library as verb
+
+    def terminated(items, _):  # type: ignore[no-untyped-def]
+        for number, item in enumerate(items):
+            if number == 2:
+                os.kill(os.getpid(), signal.SIGTERM)
+            yield item
+
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(verb, "_progress", terminated)
+    arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
+    assert "2 clips read so far are kept" in run(*arguments, code=143).output
+    assert signal.getsignal(signal.SIGTERM) is before
     monkeypatch.undo()
     assert build(folder)["read"] == 2
 

@@ -19,6 +19,7 @@ from usdhand.errors import HandNotFoundError, UsdHandError
 from usdhand.fill import Filled, FillSettings, LibraryClip, MotionLibrary, fill
 from usdhand.fill.candidates import SearchSpace
 from usdhand.fill.library import Left, Part
+from usdhand.fill.method import moving_sides
 from usdhand.fill.reconstruction import HandError, reconstruction_errors
 from usdhand.formats.files import read_clip, reopened, source_file
 from usdhand.formats.hashing import file_hash
@@ -125,7 +126,7 @@ def measure_library(
 
     Returns
     -------
-    errors, and the clips that could not be filled with the reason
+    errors, and the clips that could not be filled, or have still fingers, with the reason
     """
     from usdhand.fill import space_for
 
@@ -141,11 +142,20 @@ def measure_library(
     for source in sources:
         try:
             clip = _library_source(source, folder) if isinstance(source, LibraryClip) else source
+            hands = find_hands(clip, conventions)
+            moving = moving_sides(hands.encode(clip), hands)
+            # The library has no still hands, so of its own clips there is nothing to say.
+            if still := [] if takes is None else [s for s in hands.frames if s not in moving]:
+                which = " and ".join(still)
+                left.append(Left(clip.name, f"the {which} fingers do not move: no truth to meet"))
+            if not moving:
+                continue
             errors += reconstruction_errors(
                 clip,
-                find_hands(clip, conventions),
+                hands,
                 library,
                 settings,
+                sides=moving,
                 content_hash=file_hash(source_file(clip)),
                 spaces=None if settings.couple else spaces,
             )

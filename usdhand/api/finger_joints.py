@@ -38,6 +38,20 @@ def lacks_fingers(
     return [side for side in sides if arms is not None and side in arms.character.hands]
 
 
+def thumb_stubs(
+    clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
+) -> dict[Side, list[str]]:
+    """Names of thumb joints that a body without fingers has; what is added stands beside them."""
+    arms, skeleton = bare_arms(clip.skeleton, conventions), clip.skeleton
+    found: dict[Side, list[str]] = {}
+    for side in sides:
+        hand = arms.character.hands.get(side) if arms else None
+        for joint, name in enumerate(skeleton.names):
+            if hand and hand.wrist in skeleton.ancestors(joint) and "thumb" in name.lower():
+                found.setdefault(side, []).append(name)
+    return found
+
+
 def fingers_like(
     clip: Clip, source: Path, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
 ) -> WithFingers:

@@ -271,8 +271,9 @@ def _read(task: _Task) -> LibraryClip | Left:
             return Left(task.relative, "its fingers do not move")
         return replace(made, name=task.name)
     except UsdHandError as error:
-        reason = "it is a motion library" if is_library(task.path) else str(error)
-        return Left(task.relative, reason)
+        # The reason stands beside the path, which need not be in it again.
+        reason = str(error).removeprefix(f"{task.path}: ")
+        return Left(task.relative, "it is a motion library" if is_library(task.path) else reason)
 
 
 def _cut_again(clip: LibraryClip, segmentation: Segmentation) -> LibraryClip:

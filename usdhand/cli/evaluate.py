@@ -105,7 +105,8 @@ def command(
     except InputError as error:
         if labels_only:
             raise
-        warn(str(error), quiet)
+        if not paths:  # else it is about the takes
+            warn(str(error), quiet)
     errors: list[HandError] = []
     left_out: list[Left] = []
     for entry in motions.damaged:

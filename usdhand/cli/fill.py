@@ -127,13 +127,18 @@ def command(
 
     from usdhand import api
     from usdhand.api import filling
-    from usdhand.api.finger_joints import fingers_from_library, fingers_like, lacks_fingers
+    from usdhand.api.finger_joints import (
+        fingers_from_library,
+        fingers_like,
+        lacks_fingers,
+        thumb_stubs,
+    )
     from usdhand.errors import UsageError
     from usdhand.fill import PAPER, FillSettings
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps
-    from usdhand.report.filling import counted, fill_result
+    from usdhand.report.filling import counted, fill_result, listed
     from usdhand.report.plots import filling as plotting
 
     given: dict[str, Any] = {"metric": metric, "k": k}
@@ -168,6 +173,8 @@ def command(
     elif bare and len(bare) < len(sides(side)):
         warn(f"{body}: the {bare[0]} hand has no finger joints; --add-fingers adds some", quiet)
     if added:
+        for hand, stubs in thumb_stubs(clip, conventions, bare).items():
+            warn(f"{hand} hand: {listed(stubs)} stays as it is beside the added thumb", quiet)
         clip = added.grafted.clip
     filled = filling.fill_fingers(
         clip,
@@ -181,6 +188,8 @@ def command(
         warn(f"{body}: the {' and '.join(filled.kept)} fingers move already and are kept", quiet)
     for hand in filled.without:
         warn(f"the library has no motion of a {hand} hand like this; it stays as it is", quiet)
+    for hand in filled.still:
+        warn(f"{body}: the {hand} arm does not move, so its fingers hold one pose", quiet)
     for note in _joint_notes(filled, motions):
         warn(note, quiet)
     for part in filled.parts:

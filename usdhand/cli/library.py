@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+import signal
+import threading
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,9 +62,7 @@ def command() -> None:
 @click.option("--shortest", type=float, metavar="S", help="Shortest segment.")
 @click.option("--longest", type=float, metavar="S", help="Longest segment.")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option(
-    "--rebuild", is_flag=True, help="Read all clips again; labels are kept."
-)
+@click.option("--rebuild", is_flag=True, help="Read all clips again; labels are kept.")
 @map_option
 @report_option
 @force_option
@@ -98,7 +99,7 @@ def build(
     from usdhand.errors import OutputError
     from usdhand.formats.output import check_output
     from usdhand.report.document import document, dumps
-    from usdhand.report.filling import library_result
+    from usdhand.report.filling import counted, library_result
 
     paths = [p for p in _files(clips) if not _same(p, output)]
     check_output(output, paths, True, OUTPUTS)
@@ -107,18 +108,22 @@ def build(
         raise OutputError(f"{output} exists and is no motion library; give another name.")
     previous = _previous(output, rebuild, quiet)
     segmentation = _segmentation(speed, shortest, longest, None if rebuild else previous)
+    table = _read_labels(labels) if labels else None
     try:
-        result = filling.build_library(
-            paths,
-            output,
-            segmentation=segmentation,
-            labels=_read_labels(labels) if labels else None,
-            previous=previous,
-            rebuild=rebuild,
-            maps=maps,
-            jobs=jobs,
-            progress=_progress,
-        )
+        with _terminated_as_interrupted():
+            result = filling.build_library(
+                paths,
+                output,
+                segmentation=segmentation,
+                labels=table,
+                previous=previous,
+                rebuild=rebuild,
+                maps=maps,
+                jobs=jobs,
+                progress=_progress,
+            )
+    except _Terminated:
+        raise TerminatedBuildError(_what_is_kept(output)) from None
     except KeyboardInterrupt:
         raise InterruptedBuildError(_what_is_kept(output)) from None
     filling.write_library(result.library, output, force=True)
@@ -148,7 +153,7 @@ def build(
         warn(f"{labels}: {len(result.unmatched)} rows match no clip: {some}", quiet)
     say(
         _text(data | {"left_out": []})
-        + f"\n{result.read} clips read, {result.unchanged} unchanged",
+        + f"\n{counted(result.read, 'clip')} read, {result.unchanged} unchanged",
         quiet,
     )
     say(f"written to {output}", quiet)
@@ -178,9 +183,11 @@ def info(library: Path, as_json: bool, quiet: bool) -> None:
 
 
 def _text(data: dict[str, Any]) -> str:
+    from usdhand.report.filling import counted
+
     segments, cut = data["segments"], data["segmentation"]
     lines = [
-        f"{data['clips']} clips, {data['minutes']:.2f} minutes, segments: "
+        f"{counted(data['clips'], 'clip')}, {data['minutes']:.2f} minutes, segments: "
         f"{segments['left']} left, {segments['right']} right "
         f"({cut['shortest_s']:g} to {cut['longest_s']:g} s, cut at {cut['speed_cm_s']:g} cm/s)",
     ]
@@ -251,15 +258,45 @@ def _what_is_removed(clips: Sequence[LibraryClip]) -> str:
 
 def _what_is_kept(output: Path) -> str:
     from usdhand.api.libraries import interrupted_clips
+    from usdhand.report.filling import counted
 
     count = interrupted_clips(output)
-    kept = f"{count} clips read so far are kept" if count else "nothing was read yet"
+    verb = "is" if count == 1 else "are"
+    kept = f"{counted(count, 'clip')} read so far {verb} kept" if count else "nothing was read yet"
     old = "; the library is as it was" if output.exists() else ""
     return f"Interrupted: {kept}{old}. The same command goes on where it stopped."
 
 
 class InterruptedBuildError(UsdHandError):
     """A build was interrupted (exit 1)."""
+
+
+class TerminatedBuildError(UsdHandError):
+    """A build was ended by SIGTERM (exit 143)."""
+
+    exit_code = 143
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM while clips are read."""
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """SIGTERM raises `_Terminated`, so that what was read so far is kept."""
+
+    def terminate(*_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+        raise _Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals are the main thread's
+        return
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _segmentation(
@@ -279,7 +316,9 @@ def _read_labels(path: Path) -> dict[str, tuple[str, str]]:
 
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
+            head = file.readline()
+            file.seek(0)
+            reader = csv.DictReader(file, delimiter=max(",;\t", key=head.count))
             rows, columns = list(reader), set(reader.fieldnames or ())
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV ({error}).") from error

@@ -6,12 +6,14 @@ the palm's own frame for the hand. Positions are in centimetres of a body of ref
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from usdhand.anatomy import Hands, Side
 from usdhand.anatomy.hand import HandMap
+from usdhand.errors import InputError
 from usdhand.motion import Clip, Pose, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
@@ -22,6 +24,12 @@ LEAST_STANDING = 0.5  # of the height that the arms tell: less, and the body doe
 HEAD_TO_HEIGHT = 0.93  # lowest joint to the head joint, which lies at the top of the neck
 ARM_TO_HEIGHT = 0.332  # shoulder to wrist
 FOREARM_TO_ARM = 0.44
+# No joint is farther from its parent, and no wrist, at reference height, farther from the hips:
+# damaged files have such values, and nothing can be measured beside them.
+FARTHEST_JOINT_CM = 1e7
+FARTHEST_WRIST_CM = 1e4
+# An arm whose joints move and turn less than this is still.
+STILL_CM, STILL_TURN = 0.1, 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +89,15 @@ def _arm_length(skeleton: Skeleton, hand: HandMap) -> float:
 
 
 def arm_motion(clip: Clip, hands: Hands, side: Side) -> ArmMotion:
-    """Motion of one arm; joints that a rig lacks are replaced by the next ones up the body."""
+    """Motion of one arm; joints that a rig lacks are replaced by the next ones up the body.
+
+    Raises
+    ------
+    InputError
+        if a joint is where no body can have one.
+    """
     character, hand = hands.character, hands.character.hands[side]
+    _check_translations(clip, [hand.wrist, *clip.skeleton.ancestors(hand.wrist)])
     top = clip.skeleton.ancestors(hand.wrist)
     outermost = top[-1] if top else hand.wrist
     hips = character.hips if character.hips is not None else outermost
@@ -101,6 +116,13 @@ def arm_motion(clip: Clip, hands: Hands, side: Side) -> ArmMotion:
     length = np.linalg.norm(direction, axis=-1, keepdims=True)
     direction = direction / np.where(length > 1e-6, length, 1.0)
     scale = REFERENCE_HEIGHT_CM / body_height(clip.skeleton, hands)
+    farthest = scale * float(np.abs(wrist - pose.position(hips)).max())
+    if not farthest < FARTHEST_WRIST_CM:
+        raise InputError(
+            f"{clip.origin.path or clip.name}: joint {clip.skeleton.joints[hand.wrist]} goes "
+            f"{farthest:.3g} cm away from the hips; its translations or scales, or those above it, "
+            "are damaged."
+        )
     return ArmMotion(
         hips_position=scale * rot.rotate(to_hips, wrist - pose.position(hips)),
         chest_position=scale * rot.rotate(to_chest, wrist - pose.position(chest)),
@@ -113,6 +135,25 @@ def arm_motion(clip: Clip, hands: Hands, side: Side) -> ArmMotion:
         upper_arm=_away_from_bind(clip.skeleton, pose, shoulder, to_hips, axes),
         forearm=_away_from_bind(clip.skeleton, pose, elbow, to_hips, axes),
         wrist=rot.rotate(rot.conjugate(palm), direction),
+    )
+
+
+def _check_translations(clip: Clip, joints: Sequence[int]) -> None:
+    away = np.abs(clip.translations[:, joints]).max(axis=2)
+    frame, worst = np.unravel_index(int(np.argmax(np.nan_to_num(away, nan=np.inf))), away.shape)
+    if not away[frame, worst] < FARTHEST_JOINT_CM:
+        raise InputError(
+            f"{clip.origin.path or clip.name}: joint {clip.skeleton.joints[joints[int(worst)]]} is "
+            f"{away[frame, worst]:.3g} cm from its parent at {frame / clip.fps:.2f} s; its "
+            "translations are damaged."
+        )
+
+
+def is_still(arm: ArmMotion) -> bool:
+    """Whether nothing of an arm moves."""
+    return all(
+        bool(np.ptp(values, axis=0).max() < (STILL_TURN if values.shape[1] == 4 else STILL_CM))
+        for values in (arm.hips_position, arm.chest_position, arm.hips_palm, arm.chest_palm)
     )
 
 

@@ -10,9 +10,10 @@ from usdhand.anatomy.channels import all_channels, is_flexion
 from usdhand.fill.library import MotionLibrary, Part
 from usdhand.motion.rotations import Array
 
-# Flexion limits in degrees by joint (Palastanga et al., Anatomy and Human Movement): a little more
-# than people can, since rigs and gloves are not exact. Other angles are limited by the library.
-FLEXION_LIMITS = {"MCP": (-30.0, 100.0), "PIP": (-10.0, 120.0), "DIP": (-15.0, 90.0)}
+# Largest flexion in degrees by joint (Palastanga et al., Anatomy and Human Movement): a little more
+# than people can, since rigs and gloves are not exact. Other angles, and how far a finger bends
+# back, which few people do and every eye sees, are limited by the library.
+LARGEST_FLEXION = {"MCP": 100.0, "PIP": 120.0, "DIP": 90.0}
 
 
 def channel_limits(
@@ -20,7 +21,7 @@ def channel_limits(
 ) -> tuple[Array, Array]:
     """Smallest and largest angle (channels,) of each channel, degrees.
 
-    What some clip of the library does is possible; flexion may go to its anatomical limit too.
+    What some clip of the library does is possible; fingers may bend to their anatomical limit, too.
     """
     names = [n for side, own in zip(part, joints, strict=True) for n in all_channels(side, own)]
     low, high = np.full(len(names), np.inf), np.full(len(names), -np.inf)
@@ -34,7 +35,7 @@ def channel_limits(
                 low[span] = np.minimum(low[span], curves.min(axis=0))
                 high[span] = np.maximum(high[span], curves.max(axis=0))
     for i, name in enumerate(names):
-        limits = FLEXION_LIMITS.get(name[-4:-1])
-        if limits and is_flexion(name) and not name[2:].startswith("Thumb"):
-            low[i], high[i] = min(low[i], limits[0]), max(high[i], limits[1])
+        most = LARGEST_FLEXION.get(name[-4:-1])
+        if most and is_flexion(name) and not name[2:].startswith("Thumb"):
+            high[i] = max(high[i], most)
     return low, high

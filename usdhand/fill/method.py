@@ -11,7 +11,7 @@ import numpy as np
 from usdhand.anatomy import SIDES, Channels, Hands, Side
 from usdhand.anatomy.channels import all_channels
 from usdhand.errors import InputError, UsageError
-from usdhand.fill.arm import ArmMotion, arm_motion
+from usdhand.fill.arm import ArmMotion, arm_motion, is_still
 from usdhand.fill.assemble import Piece, join, limited, soften_seams
 from usdhand.fill.candidates import (
     Candidate,
@@ -33,6 +33,7 @@ from usdhand.fill.same import same_motion
 from usdhand.fill.segment import Segmentation
 from usdhand.fill.settings import FillSettings
 from usdhand.motion import Clip
+from usdhand.motion.rotations import Array
 
 # A segment of the body has at least so many frames: speeds and seams need some.
 FEWEST_FRAMES = 3
@@ -72,7 +73,7 @@ def fill(
     channels = hands.encode(body)
     arms = {s: at_arm_rate(arm_motion(body, hands, s), body.fps) for s in hands.frames}
     own = same_motion(library, arms, content_hash)
-    moving = tuple(s for s in sides if s in hands.frames and _moves(channels, hands, s))
+    moving = tuple(s for s in moving_sides(channels, hands) if s in sides)
     kept = () if replace_motion else moving
     open_sides: Part = tuple(s for s in sides if s in hands.frames and s not in kept)
     if not open_sides:
@@ -132,6 +133,7 @@ def fill(
         {side: names for side, names in missing.items() if names},
         tuple(library.clips[i].name for i in own),
         {s: names for s in wanted if (names := _set_aside(library, joints[s], s, own))},
+        tuple(s for part in parts if all(is_still(arms[s]) for s in part) for s in part),
         settings,
     )
 
@@ -141,8 +143,16 @@ def space_for(library: MotionLibrary, part: Part, settings: FillSettings) -> Sea
     return search_space(library, part, metric(settings.metric), settings.segmentation)
 
 
-def _moves(channels: Channels, hands: Hands, side: Side) -> bool:
-    return fingers_moving(channels.select(all_channels(side, hands.frames[side].names)).values)
+def moving_sides(channels: Channels, hands: Hands) -> tuple[Side, ...]:
+    """Hands whose fingers move."""
+    own = {s: channels.select(all_channels(s, f.names)) for s, f in hands.frames.items()}
+    return tuple(side for side in SIDES if side in own and fingers_moving(own[side].values))
+
+
+def _held(curves: Array) -> Array:
+    """Curves (frames, channels) that hold one pose, that of the frame nearest to the mean."""
+    away = np.square(curves - curves.mean(axis=0)).sum(axis=1)
+    return np.repeat(curves[[int(np.argmin(away))]], len(curves), axis=0)
 
 
 def _shared_joints(
@@ -259,6 +269,8 @@ def _fill_part(
             joined = soften_seams(joined, seams, fps)
         choices = _choices(path, network, found, cut)
         fingers = limited(joined, low, high, fps)
+        if all(map(is_still, arms)):
+            fingers = _held(fingers)
         alternatives.append(Alternative(names, fingers, choices, path.cost, seams))
     candidates = int(np.isin(space.clips, list(usable)).sum())
     return FilledPart(part, tuple(joints), space, candidates, network, tuple(alternatives))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from usdhand.anatomy import Channels, Hands, Side, fingertips
+from usdhand.anatomy import SIDES, Channels, Hands, Side, fingertips
 from usdhand.anatomy.channels import all_channels, turns
 from usdhand.fill.assemble import Piece, join
 from usdhand.fill.candidates import Candidate, SearchSpace, finger_curves, finger_sources
@@ -47,6 +47,7 @@ def reconstruction_errors(
     library: MotionLibrary,
     settings: FillSettings,
     *,
+    sides: Sequence[Side] = SIDES,
     content_hash: str | None = None,
     spaces: Mapping[Part, SearchSpace] | None = None,
 ) -> list[HandError]:
@@ -56,7 +57,7 @@ def reconstruction_errors(
         hands,
         library,
         settings,
-        sides=tuple(hands.frames),
+        sides=sides,
         replace_motion=True,
         content_hash=content_hash,
         spaces=spaces,

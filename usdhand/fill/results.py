@@ -75,6 +75,7 @@ class Filled:
     missing : hand joints that no clip that was used has; they were kept
     left_out : names of library clips that were not used, since they are the body's own
     set_aside : names of library clips that were not used, since they lack joints that were filled
+    still : hands whose arm does not move at all; their fingers hold one pose
     """
 
     clips: tuple[Clip, ...]
@@ -85,4 +86,5 @@ class Filled:
     missing: Mapping[Side, tuple[str, ...]] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     set_aside: Mapping[Side, tuple[str, ...]] = field(default_factory=dict)
+    still: tuple[Side, ...] = ()
     settings: FillSettings = field(default_factory=FillSettings)
