@@ -271,6 +271,19 @@ def test_all_passes_get_through_whatever_the_pins(
         assert all(abs(np.interp(p.body, times, warp) - p.hand) < p.tolerance + 1e-6 for p in pins)
 
 
+def test_pins_may_cross_within_their_tolerances() -> None:
+    """Both are met by a hand clip that waits; the band of the matching must not close."""
+    pins = checked_pins([Pin(1.0, 5.9, 1.0), Pin(6.5, 4.0, 1.0)], "left", 8.0, 8.0)
+    rows, times = 481, np.arange(481) / 60.0
+    assert anchors_of(pins, rows, rows, 60.0)[1:3] == ((60, 297, 3), (390, 297, 3))
+    hand = moving_hand(times)
+    for warp in align(hand, hand, SpliceSettings(band=(0.01, 0.01)), pins, times)[:2]:
+        for pin in pins:
+            assert abs(np.interp(pin.body, times, warp) - pin.hand) < pin.tolerance + 1e-6
+    with pytest.raises(UsageError, match="cross"):
+        checked_pins([Pin(1.0, 6.1, 1.0), Pin(6.5, 4.0, 1.0)], "left", 8.0, 8.0)
+
+
 def one_a_frame(pins: list[Pin]) -> list[Pin]:
     return list({p.body: p for p in pins}.values())
 
