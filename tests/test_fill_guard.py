@@ -138,7 +138,7 @@ def test_the_same_performance_on_a_body_of_other_proportions_is_left_out() -> No
     assert same_motion(library, {}, "2") == [1]
 
 
-@pytest.mark.parametrize("frames", [slice(0, 90), slice(150, 300), slice(400, 431)])
+@pytest.mark.parametrize("frames", [slice(0, 90), slice(150, 300), slice(30, 61)])
 def test_an_excerpt_is_the_same_performance(frames: slice) -> None:
     """A piece of a take is told to be of it, and not of others; and the other way round."""
     whole = [api.read_clip(TALKS / f"talk_0{i}_full.usdc") for i in (1, 2, 3)]
