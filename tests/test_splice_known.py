@@ -185,6 +185,17 @@ def test_pins_that_change_the_speed_do_not_swing(pins: list[str], near: float) -
     assert np.abs(off[[99, 399, 499]]).max() < 0.5
 
 
+def test_true_pins_do_no_harm() -> None:
+    pair = sample()
+    at = np.linspace(0, len(pair.body) - 1, 10).astype(int)[1:-1]
+    pins = tuple(Pin(t / pair.body.fps, pair.truth[t]) for t in at)
+    free, pinned = spliced(pair).hands, spliced(pair, SpliceSettings(pins=pins)).hands
+    for side, moving in ((s, pair.moving(s)) for s in free):
+        before, after = (np.abs(pair.error(h[side].warp[:, 1])[moving]) for h in (free, pinned))
+        assert np.median(after) < np.median(before) + 0.0005
+        assert after.max() < max(before.max() + 0.01, 0.05)
+
+
 @pytest.mark.parametrize("count", [2, 30, 120])
 def test_true_pins_around_frames_that_were_held(count: int) -> None:
     """The hand clip shows its frames before 300 twice; pins say so."""

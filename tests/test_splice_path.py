@@ -140,13 +140,20 @@ def test_a_stiff_curve_is_the_least_squares_one(n: int) -> None:
     assert abs(stiff(values, weights, 7.0)[1] - values[1]) < 1e-6
 
 
-def test_a_stiff_curve_bends_freely_at_what_is_exact() -> None:
+def test_a_stiff_curve_bends_freely_at_a_pin_where_the_speed_jumps_and_nowhere_else() -> None:
     rows = np.arange(101.0)
     values, weights = np.maximum(rows - 50.0, 0.0) * 3.0, np.full(101, 0.02)
     weights[50] = EXACT
     assert np.abs(stiff(values, weights, 500.0) - values).max() < 1e-6
     values[51:] += 40.0  # a jump after the pin is nothing to what is before it
     assert np.abs(stiff(values, weights, 500.0) - values)[:50].max() < 1e-6
+    values = rows + np.random.default_rng(5).normal(size=101)
+    values[50] = 50.0
+    bend = np.diff(np.eye(101), n=2, axis=0)
+    wanted = np.linalg.solve(np.diag(weights) + 500.0 * bend.T @ bend, weights * values)
+    assert np.abs(stiff(values, weights, 500.0) - wanted).max() < 1e-5
+    moved = stiff(values - rows, weights, 500.0, rows)
+    assert np.abs(moved + rows - wanted).max() < 1e-5
 
 
 def test_wide_smoothing_is_nearly_gaussian() -> None:

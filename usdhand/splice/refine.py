@@ -58,7 +58,7 @@ def refined(
             pull += independent * _dot(rate, apart) / noise
         weights = information + held
         wanted = (information * moved + pull) / weights
-        moved = np.clip(stiff(wanted, weights, STIFFNESS * (fps / 60.0) ** 4), -room, room)
+        moved = np.clip(stiff(wanted, weights, STIFFNESS * (fps / 60.0) ** 4, warp), -room, room)
     return monotone(warp + moved)
 
 

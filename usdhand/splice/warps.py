@@ -12,20 +12,36 @@ from usdhand.splice.band import Pin
 # Seconds to either side of a pin over which a matched warp gives way. Matching knows the pins, so
 # that little is missing: a path that jumps to a pin does so in one row.
 SPREAD_S = 0.02
+# The speed jumps where it changes by more than this share of the sum before and after.
+JUMP = 0.25
 # Weight of a value that a warp goes through exactly.
 EXACT = 1e9
 
 
-def stiff(values: Array, weights: Array, stiffness: float) -> Array:
+def stiff(values: Array, weights: Array, stiffness: float, start: Array | None = None) -> Array:
     """Curve (n,) near values where they have weight, and bent as little as possible elsewhere.
 
-    Minimises the sum of weights * (curve - values)^2 + stiffness * (second difference)^2. Where a
-    value is exact the curve may change its direction: else what a pin demands on one of its sides
-    would swing on the other.
+    Minimises the sum of weights * (curve - values)^2 + stiffness * (second difference)^2. At an
+    exact value where the speed of the warp jumps, the curve may bend freely: else what a pin
+    demands on one of its sides would swing on the other.
+
+    Parameters
+    ----------
+    start : the warp that the curve is added to, None if the curve is the warp
     """
+    exact = weights[1:-1] >= EXACT  # of frames 1 to n - 2
+    if not exact.any():
+        return _bent(values, weights, np.full(len(exact), stiffness))
+    curve = _bent(values, weights, np.where(exact, 0.0, stiffness))
+    speed = np.diff(curve if start is None else start + curve)
+    jumps = np.abs(np.diff(speed)) > JUMP * np.abs(speed[1:] + speed[:-1])
+    return _bent(values, weights, np.where(exact & jumps, 0.0, stiffness))
+
+
+def _bent(values: Array, weights: Array, bend: Array) -> Array:
+    """Curve of which bending costs as much at each inner frame."""
     from scipy.linalg import solveh_banded
 
-    bend = stiffness * (weights[1:-1] < EXACT)  # of frames 1 to n - 2
     bands = np.zeros((3, len(values)))
     bands[0, 2:] = bend
     bands[1, 1:-1] -= 2.0 * bend
