@@ -9,7 +9,8 @@ import numpy as np
 
 from usdhand.anatomy import Hands, Side
 from usdhand.anatomy.channels import all_channels
-from usdhand.fill.arm import ArmMotion, arm_motion, body_height
+from usdhand.errors import InputError
+from usdhand.fill.arm import FARTHEST_WRIST_CM, ArmMotion, arm_motion, body_height
 from usdhand.fill.segment import Segmentation, segments, wrist_speed
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate
@@ -19,6 +20,8 @@ from usdhand.motion.rotations import Array
 ARM_FPS = 30.0
 # Fingers that move less than this, in every channel, are still.
 STILL_DEG = 2.0
+# Angles are continuous in time, so that some go beyond a turn; no finger turns ten times.
+MOST_DEG = 3600.0
 
 # Parts of a body that are filled on their own, or both hands as one.
 Part = tuple[Side, ...]
@@ -109,6 +112,14 @@ def fingers_moving(curves: Array) -> bool:
     return bool(np.ptp(curves, axis=0).max(initial=0.0) > STILL_DEG)
 
 
+def damage(arm: Array, fingers: Array) -> str:
+    """What no hand has in rows of arm motion and finger channels; "" if nothing."""
+    for name, values, most in (("arm", arm, FARTHEST_WRIST_CM), ("fingers", fingers, MOST_DEG)):
+        if not (worst := float(np.abs(values).max())) < most:
+            return f"a value of the {name} is {worst:.3g}, which no body has"
+    return ""
+
+
 def library_hands(clip: Clip, hands: Hands, segmentation: Segmentation) -> dict[Side, LibraryHand]:
     """What a library keeps of a clip's hands: those whose fingers move."""
     found: dict[Side, LibraryHand] = {}
@@ -118,6 +129,8 @@ def library_hands(clip: Clip, hands: Hands, segmentation: Segmentation) -> dict[
         if not fingers_moving(curves):
             continue
         arm = at_arm_rate(arm_motion(clip, hands, side), clip.fps)
+        if reason := damage(pack_arm(arm), curves):
+            raise InputError(f"{clip.origin.path or clip.name}: {side} hand: {reason}.")
         speed = wrist_speed(arm.hips_position, ARM_FPS, segmentation.smoothing)
         found[side] = LibraryHand(
             arm,

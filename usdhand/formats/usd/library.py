@@ -17,7 +17,6 @@ from pxr import Sdf, Tf, Usd, Vt
 
 from usdhand.anatomy import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError, UsageError, UsdHandError
-from usdhand.fill.arm import FARTHEST_WRIST_CM
 from usdhand.fill.library import (
     ARM_FPS,
     ARM_WIDTH,
@@ -25,6 +24,7 @@ from usdhand.fill.library import (
     LibraryClip,
     LibraryHand,
     MotionLibrary,
+    damage,
     pack_arm,
     unpack_arm,
 )
@@ -35,7 +35,6 @@ from usdhand.formats.usd.stage import open_stage, usd_diagnostics
 from usdhand.formats.usd.write import save_layer
 
 VERSION = 1
-MOST_DEGREES = 3600.0  # angles are continuous in time, so that some go beyond a turn
 ROOT = "/Library"
 CLIPS = f"{ROOT}/Clips"
 LEFT_OUT = f"{ROOT}/LeftOut"
@@ -277,9 +276,8 @@ def _read_hand(side: Side, need: Callable[[str], Any]) -> LibraryHand:
         raise _DamagedError(f"its {side} arrays do not fit")
     if not (np.isfinite(arm).all() and np.isfinite(fingers).all()):
         raise _DamagedError(f"its {side} arrays have values that are no numbers")
-    for name, values, most in (("arm", arm, FARTHEST_WRIST_CM), ("fingers", fingers, MOST_DEGREES)):
-        if (worst := np.abs(values).max()) > most:
-            raise _DamagedError(f"its usdhand:{side}:{name} has a value no hand has ({worst:.3g})")
+    if reason := damage(arm, fingers):
+        raise _DamagedError(f"{side} hand: {reason}")
     inside = (segments >= 0) & (segments < len(arm))
     if not inside.all() or (segments[:, 0] >= segments[:, 1]).any():
         raise _DamagedError(f"its {side} segments do not fit")
