@@ -26,7 +26,7 @@ from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.add_joints import author_joints, joint_count
 from usdhand.formats.usd.library import is_library, read_library, write_library
 from usdhand.formats.usd.write import write_motion
-from usdhand.motion import Clip
+from usdhand.motion import Clip, Problem
 
 __all__ = [
     "BuildResult",
@@ -84,8 +84,10 @@ def write_filled(
     flatten: bool = False,
     force: bool = False,
     inputs: Sequence[Path] = (),
-) -> None:
+) -> tuple[Problem, ...]:
     """Write a filled body as a layer over its file; alternatives are variants of the animation.
+
+    Returns what one file, if it was to be one, could not keep.
 
     The variant set ``fingers`` is on the new SkelAnimation; ``choice_1``, the best, is selected.
     Joints that the body has beyond its file (`add_finger_joints`) are added to its Skeleton.
@@ -96,7 +98,7 @@ def write_filled(
     changed = sorted({*filled.changed, *added})
     digits = len(str(len(filled.clips)))  # so that editors sort them
     variants = {f"choice_{i:0{digits}}": clip for i, clip in enumerate(filled.clips, 1)}
-    write_motion(
+    return write_motion(
         character,
         best,
         changed,

@@ -14,7 +14,7 @@ from usdhand.errors import UsageError
 from usdhand.formats.files import reopened
 from usdhand.formats.usd.warp import author_warps
 from usdhand.formats.usd.write import write_motion
-from usdhand.motion import Clip
+from usdhand.motion import Clip, Problem
 from usdhand.splice import Pin, Spliced, SpliceSettings, splice
 
 __all__ = ["parse_pin", "splice_hands", "write_spliced"]
@@ -89,7 +89,7 @@ def write_spliced(
     wrist: bool = False,
     conventions: Conventions | None = None,
     inputs: Sequence[Path] = (),
-) -> None:
+) -> tuple[Problem, ...]:
     """Write a spliced body as a layer over its file, with the warps as attributes of a Scope.
 
     Parameters
@@ -102,7 +102,7 @@ def write_spliced(
     changed = [j for frames in hands.frames.values() for j in frames.links.moving]
     if wrist:
         changed += [hands.character.hands[side].wrist for side in spliced.hands]
-    write_motion(
+    return write_motion(
         character,
         clip,
         changed,

@@ -25,6 +25,7 @@ from usdhand.cli.common import (
     skel_option,
     verbose_option,
     warn,
+    warn_lost,
     warn_of,
     write_plots,
     write_report,
@@ -206,7 +207,10 @@ def command(
     if filled.left_out:
         warn(f"not used, since it is the same clip: {', '.join(filled.left_out)}", quiet)
     if not dry_run:
-        filling.write_filled(filled, output, flatten=flatten, force=force, inputs=given_files[1:])
+        lost = filling.write_filled(
+            filled, output, flatten=flatten, force=force, inputs=given_files[1:]
+        )
+        warn_lost(output, lost, quiet or as_json)
     result = fill_result(filled, motions, clip) | {"output": None if dry_run else str(output)}
     if added:
         joints = {hand: list(paths) for hand, paths in added.grafted.added.items()}
@@ -224,7 +228,9 @@ def command(
     shown = asdict(settings) | {"segmentation": asdict(cutting), "preset": preset, "side": side}
     shown |= {"replace": replace_motion, "add_fingers": bool(added), "fingers_from": fingers_from}
     shown |= {"skel": skel, "maps": maps, "flatten": flatten}
-    text = dumps(document("fill", [*given_files, *maps], shown, result))
+    # Of a long body it takes a second: only where it is asked for.
+    wanted = as_json or report is not None
+    text = dumps(document("fill", [*given_files, *maps], shown, result)) if wanted else ""
     write_report(report, text, force)
 
     def draw() -> dict[str, Figure]:

@@ -24,6 +24,7 @@ from usdhand.cli.common import (
     sides,
     skel_option,
     warn,
+    warn_lost,
     warn_of,
     write_plots,
     write_report,
@@ -144,7 +145,7 @@ def command(
     for note in spliced.notes:
         warn(f"{body} with {hands}: {note}", quiet)
     if not dry_run:
-        splicing.write_spliced(
+        lost = splicing.write_spliced(
             spliced,
             output,
             flatten=flatten,
@@ -153,6 +154,7 @@ def command(
             conventions=conventions,
             inputs=[hands],
         )
+        warn_lost(output, lost, quiet or as_json)
     result = splice_result(spliced) | {"output": None if dry_run else str(output)}
     shown = {"pins": list(pins), "band": list(settings.band), "align": align, "wrist": wrist}
     more = {"side": side, "skel": skel, "hands_skel": hands_skel}

@@ -83,11 +83,13 @@ def _inside(
 
 def _apart(short: Array, long: Array) -> Array:
     """Root mean square between rows (m, n) and each m rows of (frames, n): (frames - m + 1,)."""
-    from scipy.signal import fftconvolve
+    from scipy import fft  # not scipy.signal, which takes most of a second to import
 
     mean = short.mean(axis=0)
     short, long = short - mean, long - mean
-    products = fftconvolve(long, short[::-1], mode="valid", axes=0).sum(axis=1)
+    size = fft.next_fast_len(len(long), real=True)
+    turned = fft.rfft(long, size, axis=0) * np.conj(fft.rfft(short, size, axis=0))
+    products = fft.irfft(turned.sum(axis=1), size)[: len(long) - len(short) + 1]
     squares = np.concatenate([[0.0], np.cumsum(np.square(long).sum(axis=1))])
     windows = squares[len(short) :] - squares[: -len(short)]
     total = np.square(short).sum() + windows - 2.0 * products
