@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +31,43 @@ SMALLEST_OVERLAP = 0.7
 SHORTEST_EXCERPT_S = 1.0
 SHORT_EXCERPT_S = 2.0
 
-Rows = Mapping[str, Array]  # feature -> (frames, n) in cm or degrees
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A feature over time, (frames, n) in cm or degrees, with what comparing it takes again."""
+
+    rows: Array
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @cached_property
+    def mean(self) -> Array:
+        """(n,) over all frames."""
+        return np.asarray(self.rows.mean(axis=0))
+
+    @cached_property
+    def spectrum(self) -> NDArray[np.complexfloating]:
+        """Transform of the rows less their mean."""
+        from scipy import fft  # not scipy.signal, which takes most of a second to import
+
+        return np.asarray(fft.rfft(self.rows - self.mean, self.size, axis=0))
+
+    @cached_property
+    def size(self) -> int:
+        """Length of the transform."""
+        from scipy import fft
+
+        return int(fft.next_fast_len(len(self), real=True))
+
+    @cached_property
+    def squares(self) -> Array:
+        """(frames + 1,) sums of squares of the rows less their mean, up to each frame."""
+        squared = np.square(self.rows - self.mean).sum(axis=1)
+        return np.concatenate([[0.0], np.cumsum(squared)])
+
+
+Rows = Mapping[str, Curve]
 
 
 def same_motion(
@@ -49,7 +87,7 @@ def same_motion(
 
 
 def _rows(arm: ArmMotion) -> Rows:
-    return {name: FEATURES[name](arm) for name in ALIKE}
+    return {name: Curve(FEATURES[name](arm)) for name in ALIKE}
 
 
 def _same(pairs: list[tuple[Rows, ArmMotion]]) -> bool:
@@ -72,33 +110,31 @@ def _same(pairs: list[tuple[Rows, ArmMotion]]) -> bool:
 
 
 def _inside(
-    pairs: list[tuple[Array, Array]], tolerance: float, least: float
+    pairs: list[tuple[Curve, Curve]], tolerance: float, least: float
 ) -> tuple[NDArray[np.bool_], bool]:
     """At which offsets of the shorter rows in the longer ones all are alike, and if any moves."""
     ordered = [(a, b) if len(a) <= len(b) else (b, a) for a, b in pairs]
     apart = np.max([_apart(short, long) for short, long in ordered], axis=0)
-    moves = max(np.ptp(short, axis=0).max() for short, _ in ordered) >= least
+    moves = max(np.ptp(short.rows, axis=0).max() for short, _ in ordered) >= least
     return np.asarray(apart < tolerance), bool(moves)
 
 
-def _apart(short: Array, long: Array) -> Array:
+def _apart(short: Curve, long: Curve) -> Array:
     """Root mean square between rows (m, n) and each m rows of (frames, n): (frames - m + 1,)."""
-    from scipy import fft  # not scipy.signal, which takes most of a second to import
+    from scipy import fft
 
-    mean = short.mean(axis=0)
-    short, long = short - mean, long - mean
-    size = fft.next_fast_len(len(long), real=True)
-    turned = fft.rfft(long, size, axis=0) * np.conj(fft.rfft(short, size, axis=0))
-    products = fft.irfft(turned.sum(axis=1), size)[: len(long) - len(short) + 1]
-    squares = np.concatenate([[0.0], np.cumsum(np.square(long).sum(axis=1))])
-    windows = squares[len(short) :] - squares[: -len(short)]
-    total = np.square(short).sum() + windows - 2.0 * products
-    return np.asarray(np.sqrt(np.maximum(total, 0.0) / short.size))
+    rows = short.rows - long.mean
+    turned = np.conj(fft.rfft(rows, long.size, axis=0))
+    turned *= long.spectrum
+    products = fft.irfft(turned.sum(axis=1), long.size)[: len(long) - len(rows) + 1]
+    windows = long.squares[len(rows) :] - long.squares[: -len(rows)]
+    total = np.square(rows).sum() + windows - 2.0 * products
+    return np.asarray(np.sqrt(np.maximum(total, 0.0) / rows.size))
 
 
-def _alike(pairs: list[tuple[Array, Array]], tolerance: float, least: float) -> bool:
+def _alike(pairs: list[tuple[Curve, Curve]], tolerance: float, least: float) -> bool:
     """Whether all pairs of rows (frames, n) are alike at one offset, and some of them moves."""
-    if max(np.ptp(a, axis=0).max() for a, _ in pairs) < least:
+    if max(np.ptp(a.rows, axis=0).max() for a, _ in pairs) < least:
         return False
     most = int(LONGEST_OFFSET_S * ARM_FPS)
 
@@ -108,7 +144,7 @@ def _alike(pairs: list[tuple[Array, Array]], tolerance: float, least: float) -> 
             count = min(len(a) - max(-offset, 0), len(b) - max(offset, 0))
             if count < SMALLEST_OVERLAP * min(len(a), len(b)):
                 return np.inf
-            first, second = a[max(-offset, 0) :][:count], b[max(offset, 0) :][:count]
+            first, second = a.rows[max(-offset, 0) :][:count], b.rows[max(offset, 0) :][:count]
             distances.append(float(np.sqrt(np.mean((first - second) ** 2))))
         return max(distances)
 
