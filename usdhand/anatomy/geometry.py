@@ -314,8 +314,3 @@ def _thumb_distance(points: Array, wrist: int, digits: _Digits) -> float:
     starts = points[[line[0] for _, line, _ in digits.values()]]
     thumb, *fingers = np.linalg.norm(starts - points[wrist], axis=1)
     return float(thumb / max(np.mean(fingers), 1e-9))
-
-
-def _angle(a: Array, b: Array) -> float:
-    """Angle between two vectors in degrees."""
-    return float(np.degrees(np.arccos(np.clip(unit(a) @ unit(b), -1.0, 1.0))))

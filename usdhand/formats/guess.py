@@ -26,8 +26,6 @@ OTHERS = {"decimetres": 10.0, "inches": 2.54, "units of the CMU library": 2.54 /
 # How much longer a body must be along Z than along Y to stand on Z.
 CLEARLY_LONGER = 1.25
 
-Y_UP_FROM_Z_UP: Array = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-
 
 def guess_units(
     offsets: Array, parents: NDArray[np.intp], names: Iterable[str]

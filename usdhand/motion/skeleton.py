@@ -118,6 +118,15 @@ class Skeleton:
         shared = set(lines[0]).intersection(*lines[1:])
         return next((joint for joint in lines[0] if joint in shared), None)
 
+    def accumulated(self, local: Array) -> Array:
+        """Return world matrices (joints, 4, 4) of joint-to-parent ones."""
+        world = local.copy()
+        for joint in self.order:
+            parent = int(self.parents[joint])
+            if parent >= 0:
+                world[joint] = world[parent] @ local[joint]
+        return world
+
     def find(self, name: str) -> int | None:
         """Index of the joint with this full path or, if only one has it, this leaf name."""
         if name in self.joints:

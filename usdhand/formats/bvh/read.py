@@ -13,10 +13,10 @@ from usdhand.formats.bvh.file import BvhFile, parse_file
 from usdhand.formats.bvh.hierarchy import Hierarchy
 from usdhand.formats.bvh.motion import local_motion
 from usdhand.formats.bvh.pose import choose_bind, posed_skeleton
-from usdhand.formats.guess import Y_UP_FROM_Z_UP, guess_units, guess_up
+from usdhand.formats.guess import guess_units, guess_up
 from usdhand.motion import Clip, Origin, Problem, forward_kinematics
 from usdhand.motion import rotations as rot
-from usdhand.motion.rotations import IDENTITY, Array
+from usdhand.motion.rotations import IDENTITY, Y_UP_FROM_Z_UP, Array
 
 LOOKED_AT = 40  # frames that the up axis is guessed from
 # Joints times frames that need as much memory as any motion; more only if most joints move.

@@ -14,10 +14,9 @@ from usdhand.formats.fbx.scene import Sampled, Scene, load_scene
 from usdhand.formats.fbx.skeletons import Rig, find_rig, find_take, keyed_takes
 from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
-from usdhand.motion.rotations import Array
+from usdhand.motion.rotations import Y_UP_FROM_Z_UP
 
 DEFAULT_FPS = 30.0  # what FBX programs play a file at that does not say
-Y_UP_FROM_Z_UP: Array = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
 def read_clip(

@@ -19,10 +19,9 @@ from usdhand.formats.gltf.timing import DEFAULT_FPS, Timing, find_timing
 from usdhand.formats.gltf.vrm import Humanoid, read_humanoid
 from usdhand.motion import Clip, Origin, Problem, Skeleton
 from usdhand.motion import rotations as rot
-from usdhand.motion.rotations import Array
+from usdhand.motion.rotations import Y_UP_FROM_Z_UP
 
 CM_PER_UNIT = 100.0
-Y_UP_FROM_Z_UP: Array = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 MOST_VALUES = 20_000_000  # frames times joints: 55 minutes of 100 joints at 60 fps
 MOST_PATH_LETTERS = 20_000_000
 

@@ -11,9 +11,8 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from usdhand.formats.usd.animation import author_animation
 from usdhand.formats.usd.names import author_names, legal_name, legal_skeleton
 from usdhand.formats.usd.stage import Character
-from usdhand.formats.usd.world import Y_UP_FROM_Z_UP
 from usdhand.motion import Clip, Skeleton
-from usdhand.motion.rotations import Array
+from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
 
 METERS_PER_UNIT = 0.01
 

@@ -228,7 +228,7 @@ def _mend_skeleton(layer: Sdf.Layer, character: Character, clip: Clip) -> None:
         if poses.rest is None:
             skeleton.CreateRestTransformsAttr(gf_matrices(local))
         if poses.bind is None:
-            skeleton.CreateBindTransformsAttr(gf_matrices(_accumulated(local, clip)))
+            skeleton.CreateBindTransformsAttr(gf_matrices(clip.skeleton.accumulated(local)))
     if not prim.HasAPI(UsdSkel.BindingAPI):
         UsdSkel.BindingAPI.Apply(prim)
 
@@ -262,12 +262,3 @@ def _matrix(rotation: Array, translation: Array) -> Array:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, translation
     return matrix
-
-
-def _accumulated(local: Array, clip: Clip) -> Array:
-    result = local.copy()
-    for j in clip.skeleton.order:
-        parent = int(clip.skeleton.parents[j])
-        if parent >= 0:
-            result[j] = result[parent] @ local[j]
-    return result

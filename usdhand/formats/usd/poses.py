@@ -72,8 +72,8 @@ def placed_skeleton(
     skeleton = Skeleton(joints, parents, first_frame, rest)
     if poses.bind is None:
         local = rest if poses.rest is not None else first_frame
-        return replace(skeleton, bind=_accumulate(skeleton, local)), ()
-    posed = _accumulate(skeleton, first_frame)
+        return replace(skeleton, bind=skeleton.accumulated(local)), ()
+    posed = skeleton.accumulated(first_frame)
     in_skeleton_space = _transformed(poses.bind, world.rotation[0], world.translation[0])
     in_world_space = _transformed(poses.bind, world.axes, np.zeros(3))
     # UsdSkel's documentation says world space, Blender writes skeleton space, Maya world space.
@@ -118,15 +118,6 @@ def _transformed(matrices: Array, rotation: Array, translation: Array) -> Array:
     result[:, :3, :3] = rotation @ matrices[:, :3, :3]
     result[:, :3, 3] = matrices[:, :3, 3] @ rotation.T + translation
     return result
-
-
-def _accumulate(skeleton: Skeleton, local: Array) -> Array:
-    world = local.copy()
-    for j in skeleton.order:
-        p = int(skeleton.parents[j])
-        if p >= 0:
-            world[j] = world[p] @ local[j]
-    return world
 
 
 def _bones(matrices: Array, parents: NDArray[np.intp]) -> Array:

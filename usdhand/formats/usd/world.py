@@ -9,10 +9,9 @@ from pxr import Usd, UsdGeom
 
 from usdhand.errors import InputError
 from usdhand.motion import Problem
-from usdhand.motion.rotations import Array
+from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
 
 UNIFORM_SCALE_TOLERANCE = 0.01
-Y_UP_FROM_Z_UP: Array = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
 @dataclass(frozen=True, eq=False)
