@@ -16,10 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from usdhand.api import filling, read_clip
+from usdhand.evaluate.reconstruction import HandError
 from usdhand.fill import PAPER, PAPER_SEGMENTATION, FillSettings, MotionLibrary
-from usdhand.fill.reconstruction import HandError
 from usdhand.motion import Clip
+from usdhand.verbs import fill as filling
+from usdhand.verbs import read_clip
 
 SIDES = ("right", "left")
 DEFAULT = FillSettings()

@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from usdhand import api
-from usdhand.api import filling
+from usdhand import verbs as api
 from usdhand.fill import FillSettings
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
+from usdhand.verbs import fill as filling
 
 HERE = Path(__file__).resolve().parent.parent
 REAL = HERE.parent / "shared" / "data" / "studiogalt" / "full"

@@ -22,12 +22,12 @@ from typing import Any
 
 import numpy as np
 
-from usdhand import api
+from usdhand import verbs as api
 from usdhand.anatomy import Hands
-from usdhand.api.previewing import PreviewSettings, preview_clips, write_preview
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
+from usdhand.verbs.preview import PreviewSettings, preview_clips, write_preview
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
 FPS, SECONDS = 60.0, 60.0

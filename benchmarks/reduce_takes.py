@@ -19,7 +19,6 @@ import numpy as np
 from hand_agreement import agreement_of_rigs, off_axis_shares
 
 from usdhand.anatomy.channels import Channels, Hands
-from usdhand.api import find_hands, read_clip
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.reduce import (
@@ -32,6 +31,7 @@ from usdhand.reduce import (
     fit_rig,
     pca_rms,
 )
+from usdhand.verbs import find_hands, read_clip
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "gestures"
 FITS: dict[str, tuple[Fit, int]] = {

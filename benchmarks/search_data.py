@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from usdhand.alignment import PackedSegments
+from usdhand.search import PackedSegments
 
 FPS = 60
 SHARED = Path(os.environ.get("USDHAND_SHARED", Path(__file__).resolve().parents[2] / "shared"))

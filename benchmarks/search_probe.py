@@ -18,7 +18,7 @@ import numpy as np
 
 def load(folder: Path) -> float:
     """Seconds to load a stored library and search it, everything imported and compiled."""
-    from usdhand.alignment import PackedSegments, SearchIndex, search
+    from usdhand.search import PackedSegments, SearchIndex, search
 
     start(folder)
     stored = np.load(folder / "queries.npz")
@@ -33,7 +33,7 @@ def load(folder: Path) -> float:
 def start(_: Path) -> float:
     """Seconds of a first search of next to nothing."""
     began = time.perf_counter()
-    from usdhand.alignment import pack, prepare, search
+    from usdhand.search import pack, prepare, search
 
     segments = pack([np.arange(240.0).reshape(-1, 12)] * 3)
     search(prepare(segments), segments)

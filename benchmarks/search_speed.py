@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 import search_data
 
-from usdhand.alignment import PackedSegments, SearchIndex, prepare, search
+from usdhand.search import PackedSegments, SearchIndex, prepare, search
 
 QUERIES = 60
 

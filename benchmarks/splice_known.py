@@ -2,7 +2,8 @@
 
 Run: python benchmarks/splice_known.py [--takes FOLDER] [--space] [--seed N]
 
-Pairs are made of real takes, see tests/known_pairs.py. Counted are frames of the body at which the
+Pairs are made of real takes, see tests/builders/known_pairs.py. Counted are frames of the body at
+which the
 wrist moves, relative to the shoulder, faster than 15 cm/s. Errors are in the body's time: how far
 the moment that is shown is from the one that should be. Every third take was kept aside while
 settings were chosen. With --space the noise is 3 mm in space instead of 3 mm a coordinate.
@@ -21,7 +22,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(HERE / "tests"))
 
-from known_pairs import NOISE_CM, Pair, known_pair, known_pairs  # noqa: E402
+from builders.known_pairs import NOISE_CM, Pair, known_pair, known_pairs  # noqa: E402
 
 from usdhand.anatomy import Side  # noqa: E402
 from usdhand.motion.rotations import Array  # noqa: E402

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from splice_peers import PEERS
 
-from usdhand import api
+from usdhand import verbs as api
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.method import SpliceSettings, align, pinned_band
 from usdhand.splice.phases import smoothed

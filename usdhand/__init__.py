@@ -1,6 +1,6 @@
 """Hands for digital characters: reduce, fill, splice and convert finger motion over OpenUSD.
 
-The functions are the verbs of the command line, on values: see `usdhand.api`.
+The functions are the verbs of the command line, on values: see `usdhand.verbs`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     # numpy and pxr take a quarter of a second to import: only when a verb is used.
     if name in __all__:
-        from usdhand import api
+        from usdhand import verbs as api
 
         return getattr(api, name)
     raise AttributeError(f"module 'usdhand' has no attribute '{name}'")

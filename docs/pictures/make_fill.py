@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from sheet import ROOT, Column, sheet
 
-from usdhand import api
-from usdhand.api import filling
+from usdhand import verbs as api
+from usdhand.verbs import fill as filling
 
 TALKS = ROOT / "samples" / "conversations"
 FRAMES = (235, 330, 405)

@@ -13,11 +13,11 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 from playwright.sync_api import Browser, sync_playwright
 
-from usdhand import api
-from usdhand.api import filling
-from usdhand.api.previewing import preview_clips, write_preview
+from usdhand import verbs as api
 from usdhand.report.document import document, dumps
 from usdhand.report.filling import fill_result
+from usdhand.verbs import fill as filling
+from usdhand.verbs.preview import preview_clips, write_preview
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = ROOT / "samples"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from sheet import BEN_HAND, ROOT, Column, sheet
 
-from usdhand import api
+from usdhand import verbs as api
 
 CLIP = ROOT / "samples" / "conversations" / "talk_01_full.usdc"
 BEN = ROOT / "samples" / "characters" / "ben.usdc"

@@ -21,8 +21,8 @@ SAMPLES = 32
 
 def main() -> None:
     """Fill, render, compose."""
-    from usdhand import api
-    from usdhand.api import filling
+    from usdhand import verbs as api
+    from usdhand.verbs import fill as filling
 
     folder = Path(tempfile.mkdtemp())
     clips = sorted((ROOT / "samples" / "gestures").glob("*.usdc"))

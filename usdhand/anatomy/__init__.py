@@ -1,11 +1,9 @@
-"""Hands: their joints, channels, and where to find them on a rig."""
+"""What a hand is: digits, joints, channels, anatomical frames."""
 
 from usdhand.anatomy.channels import Channels, Hands, decode, encode
-from usdhand.anatomy.conventions import Conventions, load_conventions
 from usdhand.anatomy.fingertips import fingertips
 from usdhand.anatomy.frames import HandFrames, hand_frames
 from usdhand.anatomy.hand import DIGITS, HAND_JOINTS, SIDES, CharacterMap, HandMap, Side
-from usdhand.anatomy.mapping import map_character
 
 __all__ = [
     "DIGITS",
@@ -13,7 +11,6 @@ __all__ = [
     "SIDES",
     "Channels",
     "CharacterMap",
-    "Conventions",
     "HandFrames",
     "HandMap",
     "Hands",
@@ -22,6 +19,4 @@ __all__ = [
     "encode",
     "fingertips",
     "hand_frames",
-    "load_conventions",
-    "map_character",
 ]

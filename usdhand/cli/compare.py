@@ -59,7 +59,7 @@ def command(
     Example:
       usdhand compare talk_01_full.usdc talk_01_filled.usda
     """
-    from usdhand import api
+    from usdhand import verbs as api
     from usdhand.errors import QualityError
     from usdhand.report.document import document, dumps
     from usdhand.report.results import compare_result

@@ -27,7 +27,7 @@ from usdhand.cli.common import (
 from usdhand.errors import UsageError, UsdHandError
 
 if TYPE_CHECKING:
-    from usdhand.api.converting import Converted, Edits, Reading
+    from usdhand.verbs.convert import Converted, Edits, Reading
 
 UNITS = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}
 Span = tuple[float | None, float | None]
@@ -155,10 +155,10 @@ def command(
       usdhand convert takes/*.fbx --out-dir usd
       usdhand convert gloves.glb --onto hero.usd -o hero_hands.usdc
     """
-    from usdhand.api.clips import conventions_from
-    from usdhand.api.converting import Edits
     from usdhand.formats.files import Reading
     from usdhand.report.document import document, dumps
+    from usdhand.verbs.clips import conventions_from
+    from usdhand.verbs.convert import Edits
 
     edits = Edits(fps, start, trim, scale, root_motion, up)
     reading = Reading(skel, animation, units, input_up)
@@ -268,8 +268,8 @@ def _convert(
     force: bool,
     dry_run: bool,
 ) -> dict[str, Any]:
-    from usdhand.api.converting import Reading, convert
     from usdhand.report.converting import convert_result
+    from usdhand.verbs.convert import Reading, convert
 
     done: Converted = convert(
         path,

@@ -27,8 +27,8 @@ from usdhand.cli.common import (
 )
 
 if TYPE_CHECKING:
+    from usdhand.evaluate.reconstruction import HandError
     from usdhand.fill.library import Left
-    from usdhand.fill.reconstruction import HandError
     from usdhand.motion import Clip
 
 
@@ -84,13 +84,13 @@ def command(
     """
     from dataclasses import asdict, replace
 
-    from usdhand.api import filling
     from usdhand.errors import InputError
+    from usdhand.evaluate.agreement import label_agreement
     from usdhand.fill import PAPER, FillSettings
-    from usdhand.fill.agreement import label_agreement
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import evaluation_result
     from usdhand.report.plots import evaluating
+    from usdhand.verbs import fill as filling
 
     settings = replace(PAPER if preset == "paper" else FillSettings(), k=k)
     if metric:
@@ -136,7 +136,7 @@ def command(
 
 def _read(paths: Sequence[Path]) -> tuple[list[Clip], list[Left]]:
     """Clips, and the files that are none."""
-    from usdhand import api
+    from usdhand import verbs as api
     from usdhand.errors import UsdHandError
     from usdhand.fill.library import Left
 

@@ -64,7 +64,7 @@ def command(
       usdhand expand ok_rig.usda -o ok.usda
       usdhand expand ok_rig.usda --onto samples/characters/ben.usdc -o ben_ok.usda
     """
-    from usdhand import api
+    from usdhand import verbs as api
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps

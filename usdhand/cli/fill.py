@@ -126,14 +126,7 @@ def command(
     """
     from dataclasses import asdict, replace
 
-    from usdhand import api
-    from usdhand.api import filling
-    from usdhand.api.finger_joints import (
-        fingers_from_library,
-        fingers_like,
-        lacks_fingers,
-        thumb_stubs,
-    )
+    from usdhand import verbs as api
     from usdhand.errors import UsageError
     from usdhand.fill import PAPER, FillSettings
     from usdhand.formats.output import check_output
@@ -141,6 +134,13 @@ def command(
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import counted, fill_result, listed
     from usdhand.report.plots import filling as plotting
+    from usdhand.verbs import fill as filling
+    from usdhand.verbs.finger_joints import (
+        fingers_from_library,
+        fingers_like,
+        lacks_fingers,
+        thumb_stubs,
+    )
 
     given: dict[str, Any] = {"metric": metric, "k": k}
     settings = replace(

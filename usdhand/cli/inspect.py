@@ -21,7 +21,7 @@ from usdhand.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from usdhand.anatomy import Conventions
+    from usdhand.rigs import Conventions
 
 
 @click.command("inspect")
@@ -45,9 +45,9 @@ def command(
     Example:
       usdhand inspect samples/characters samples/gestures/ok_01.usdc
     """
-    from usdhand.api.clips import conventions_from
     from usdhand.errors import HandNotFoundError, UsdHandError
     from usdhand.report.document import document, dumps
+    from usdhand.verbs.clips import conventions_from
 
     paths = find_files(files)
     conventions = conventions_from(maps)
@@ -74,10 +74,10 @@ def command(
 
 
 def _inspect(path: Path, skel: str | None, conventions: Conventions | None) -> dict[str, Any]:
-    from usdhand.api.clips import find_hands
     from usdhand.errors import HandNotFoundError
     from usdhand.formats.files import animation_names, read_any, read_character
     from usdhand.report.results import inspect_result
+    from usdhand.verbs.clips import find_hands
 
     names = animation_names(path)
     clip, animated = read_any(path, skel) if len(names) < 2 else (read_character(path, skel), False)

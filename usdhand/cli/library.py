@@ -95,11 +95,11 @@ def build(
       usdhand library build samples/gestures -o gestures.usdc
       usdhand library build takes/*.usdc -o takes.usdc --jobs 2 --labels takes.csv
     """
-    from usdhand.api import filling
     from usdhand.errors import OutputError
     from usdhand.formats.output import check_output
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import counted, library_result
+    from usdhand.verbs import fill as filling
 
     paths = [p for p in _files(clips) if not _same(p, output)]
     check_output(output, paths, True, OUTPUTS)
@@ -170,9 +170,9 @@ def info(library: Path, as_json: bool, quiet: bool) -> None:
     Example:
       usdhand library info gestures.usdc
     """
-    from usdhand.api import filling
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import library_result
+    from usdhand.verbs import fill as filling
 
     motions = filling.read_library(library)
     data = library_result(motions, filling.gone_clips(motions, library.absolute().parent))
@@ -226,8 +226,8 @@ def _hidden(path: Path) -> bool:
 
 def _previous(output: Path, rebuild: bool, quiet: bool) -> MotionLibrary | None:
     """The library that is built again; of one that cannot be read, --rebuild needs nothing."""
-    from usdhand.api import filling
     from usdhand.errors import InputError
+    from usdhand.verbs import fill as filling
 
     if not output.exists():
         return None
@@ -242,8 +242,8 @@ def _previous(output: Path, rebuild: bool, quiet: bool) -> MotionLibrary | None:
 
 def _what_is_removed(clips: Sequence[LibraryClip]) -> str:
     """Say which clips of the old library were not given; work of a person in full."""
-    from usdhand.api.libraries import is_edited
     from usdhand.report.filling import counted, listed
+    from usdhand.verbs.library import is_edited
 
     text = (
         f"{counted(len(clips), 'clip')} of the old library removed, since not given this time: "
@@ -257,8 +257,8 @@ def _what_is_removed(clips: Sequence[LibraryClip]) -> str:
 
 
 def _what_is_kept(output: Path) -> str:
-    from usdhand.api.libraries import interrupted_clips
     from usdhand.report.filling import counted
+    from usdhand.verbs.library import interrupted_clips
 
     count = interrupted_clips(output)
     verb = "is" if count == 1 else "are"

@@ -85,15 +85,15 @@ def command(
     Example:
       usdhand preview samples/gestures/ok_01.usdc samples/gestures/ok_02.usdc -o ok.html
     """
-    from usdhand import api
-    from usdhand.api.previewing import (
+    from usdhand import verbs as api
+    from usdhand.formats.output import check_output
+    from usdhand.report.document import document, dumps
+    from usdhand.verbs.preview import (
         PAGE_SUFFIXES,
         PreviewSettings,
         preview_clips,
         write_preview,
     )
-    from usdhand.formats.output import check_output
-    from usdhand.report.document import document, dumps
 
     paths = find_files(files)
     inputs = [*paths, *reports, *figures]

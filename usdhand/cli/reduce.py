@@ -120,7 +120,7 @@ def command(
       usdhand reduce takes/*.usdc -o rigs/ --target-dofs 20 --fit least-squares
       usdhand reduce new_take.usdc --rig rigs/take_01.rig.usdc -o new_rig.usdc
     """
-    from usdhand import api
+    from usdhand import verbs as api
     from usdhand.errors import UsageError
     from usdhand.formats.output import make_folder
     from usdhand.report.document import document, dumps

@@ -115,8 +115,7 @@ def command(
     The hand clip of the example shows the first six seconds of the body: pins say where it begins
     and ends. Of clips that begin and end together, no pin is needed.
     """
-    from usdhand import api
-    from usdhand.api import splicing
+    from usdhand import verbs as api
     from usdhand.errors import UsdHandError
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
@@ -124,6 +123,7 @@ def command(
     from usdhand.report.plots import splicing as plotting
     from usdhand.report.splicing import splice_result
     from usdhand.splice import SpliceSettings
+    from usdhand.verbs import splice as splicing
 
     settings = SpliceSettings(band=_widths(band), align=align, wrist=wrist)  # type: ignore[arg-type]
     check_output(output, [body, hands], force, USD_SUFFIXES)

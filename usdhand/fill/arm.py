@@ -12,18 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from usdhand.anatomy import Hands, Side
-from usdhand.anatomy.hand import HandMap
 from usdhand.errors import InputError
 from usdhand.motion import Clip, Pose, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.rigs.height import REFERENCE_HEIGHT_CM, body_height
 
-REFERENCE_HEIGHT_CM = 170.0
-SMALLEST_HEIGHT_CM = 1.0  # less is no body, but joints in one place
-LEAST_STANDING = 0.5  # of the height that the arms tell: less, and the body does not stand
-HEAD_TO_HEIGHT = 0.93  # lowest joint to the head joint, which lies at the top of the neck
-ARM_TO_HEIGHT = 0.332  # shoulder to wrist
-FOREARM_TO_ARM = 0.44
 # No joint is farther from its parent, and no wrist, at reference height, farther from the hips:
 # damaged files have such values, and nothing can be measured beside them.
 FARTHEST_JOINT_CM = 1e7
@@ -60,34 +54,6 @@ class ArmMotion:
     wrist: Array
 
 
-def body_height(skeleton: Skeleton, hands: Hands) -> float:
-    """Height of a character at its bind pose, cm.
-
-    From the lowest joint to the head's; for what is no whole body, from the length of an arm
-    (Winter, Biomechanics and Motor Control of Human Movement, 2009, figure 4.1).
-    """
-    character = hands.character
-    length = max(_arm_length(skeleton, h) for h in character.hands.values())
-    height = length / ARM_TO_HEIGHT
-    if character.head is not None and character.hips is not None:
-        hips = character.hips
-        body = [j for j in range(len(skeleton)) if j == hips or hips in skeleton.ancestors(j)]
-        heights = skeleton.bind_positions[:, 1]
-        # Not to the highest joint: some rigs have eyes, hair or an end above the head joint.
-        standing = float(heights[character.head] - heights[body].min()) / HEAD_TO_HEIGHT
-        if standing > LEAST_STANDING * height:  # else the bind pose lies
-            height = standing
-    return height if height > SMALLEST_HEIGHT_CM else REFERENCE_HEIGHT_CM
-
-
-def _arm_length(skeleton: Skeleton, hand: HandMap) -> float:
-    chain = [j for j in (hand.shoulder, hand.elbow, hand.wrist) if j is not None]
-    points = skeleton.bind_positions[chain]
-    # Without a shoulder, the forearm stands for nearly half of the arm.
-    share = 1.0 if hand.shoulder is not None else FOREARM_TO_ARM
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) / share
-
-
 def arm_motion(clip: Clip, hands: Hands, side: Side) -> ArmMotion:
     """Motion of one arm; joints that a rig lacks are replaced by the next ones up the body.
 
@@ -115,7 +81,7 @@ def arm_motion(clip: Clip, hands: Hands, side: Side) -> ArmMotion:
     direction = wrist - pose.position(elbow)
     length = np.linalg.norm(direction, axis=-1, keepdims=True)
     direction = direction / np.where(length > 1e-6, length, 1.0)
-    scale = REFERENCE_HEIGHT_CM / body_height(clip.skeleton, hands)
+    scale = REFERENCE_HEIGHT_CM / body_height(clip.skeleton, hands.character)
     farthest = scale * float(np.abs(wrist - pose.position(hips)).max())
     if not farthest < FARTHEST_WRIST_CM:
         raise InputError(

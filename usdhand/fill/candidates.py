@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from usdhand.alignment import PackedSegments, SearchIndex, pack, prepare, search, warp_many
 from usdhand.fill.arm import ArmMotion
 from usdhand.fill.library import ARM_FPS, MotionLibrary, Part
 from usdhand.fill.metric import Metric
 from usdhand.fill.segment import Segmentation, segments, wrist_speed
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
+from usdhand.search import PackedSegments, SearchIndex, pack, prepare, search, warp_many
 
 
 @dataclass(frozen=True, eq=False)

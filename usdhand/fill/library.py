@@ -10,11 +10,12 @@ import numpy as np
 from usdhand.anatomy import Hands, Side
 from usdhand.anatomy.channels import all_channels
 from usdhand.errors import InputError
-from usdhand.fill.arm import FARTHEST_WRIST_CM, ArmMotion, arm_motion, body_height
+from usdhand.fill.arm import FARTHEST_WRIST_CM, ArmMotion, arm_motion
 from usdhand.fill.segment import Segmentation, segments, wrist_speed
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
+from usdhand.rigs.height import body_height
 
 # Arms are searched at this rate; fingers keep that of their clip.
 ARM_FPS = 30.0
@@ -158,7 +159,7 @@ def library_clip(
         clip.origin.skeleton_path,
         label,
         actor,
-        body_height(clip.skeleton, hands),
+        body_height(clip.skeleton, hands.character),
         clip.fps,
         clip.duration,
         content_hash,

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from usdhand.anatomy import Conventions, map_character
 from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Problem
 from usdhand.report.document import rounded
 from usdhand.report.results import problems_data
+from usdhand.rigs import Conventions, map_character
 
 
 def convert_result(

@@ -9,11 +9,11 @@ import numpy as np
 
 from usdhand.anatomy import SIDES, Side
 from usdhand.anatomy.hand import SIDE_PREFIX
+from usdhand.evaluate.agreement import Agreement
+from usdhand.evaluate.reconstruction import METHODS, HandError
 from usdhand.fill import Filled, MotionLibrary
-from usdhand.fill.agreement import Agreement
 from usdhand.fill.candidates import Candidate, SearchSpace
 from usdhand.fill.library import ARM_FPS
-from usdhand.fill.reconstruction import METHODS, HandError
 from usdhand.fill.results import Alternative, Choice, FilledPart
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate

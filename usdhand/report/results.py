@@ -10,7 +10,7 @@ import numpy as np
 from usdhand.anatomy import Hands
 from usdhand.anatomy.channels import is_flexion
 from usdhand.anatomy.hand import CharacterMap, HandMap
-from usdhand.compare import Comparison
+from usdhand.evaluate.compare import Comparison
 from usdhand.formats.usd.check import Finding
 from usdhand.motion import Clip, Problem
 from usdhand.reduce import Errors, ReducedRig, Reduction, pca_rms

@@ -80,7 +80,7 @@ def phase_path(
     smoothing : standard deviation of the Gaussian whose derivatives are taken, seconds
     dead_zone : derivatives below this share of their RMS have the sign 0
     """
-    from usdhand.alignment import phase_dtw
+    from usdhand.dtw import phases as phase_dtw
 
     turns = phase_dtw.turn_angles(TURNS) if align == "local" else np.zeros(1)
     if align == "trunk":
@@ -118,7 +118,7 @@ def steadied(
     ----------
     band : of the new path; the old one must be within
     """
-    from usdhand.alignment import phase_dtw
+    from usdhand.dtw import phases as phase_dtw
 
     turned = facing(body, -steady_turns(body, hand, path.middle))
     ours = derivative_signs(turned, smoothing, dead_zone, np.zeros(1), directions)
@@ -147,7 +147,7 @@ def settled(
     ----------
     room : (rows,) body frames by which the warp may move, 0: not at all
     """
-    from usdhand.alignment import phase_dtw
+    from usdhand.dtw import phases as phase_dtw
 
     rows = np.arange(len(body))
     ours, theirs = (
@@ -179,7 +179,7 @@ def _evidence(
     ours: NDArray[np.uint64], theirs: NDArray[np.uint64], path: Array, shift: float
 ) -> Array:
     """(rows,) 0 to 1: by how much the signs would differ more if the path were shifted."""
-    from usdhand.alignment.phase_dtw import sign_costs
+    from usdhand.dtw.phases import sign_costs
 
     def costs(by: float) -> Array:
         columns = np.clip(np.rint(path + by), 0, theirs.shape[1] - 1).astype(np.int64)
@@ -226,7 +226,7 @@ def derivative_signs(
     -------
     (turns, 2, frames) words: bits of the signs that are positive, and of those that are negative
     """
-    from usdhand.alignment.phase_dtw import signs_along
+    from usdhand.dtw.phases import signs_along
 
     result = np.zeros((len(turns), 2, len(markers)), np.uint64)
     axes = sign_axes(directions)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from usdhand.fill.agreement import Agreement
-from usdhand.fill.reconstruction import METHODS, HandError
+from usdhand.evaluate.agreement import Agreement
+from usdhand.evaluate.reconstruction import METHODS, HandError
 from usdhand.report.filling import evaluation_result
 from usdhand.report.plots import style
 from usdhand.report.plots.style import BLACK, BLUE, GREY, ORANGE, SKY, YELLOW, styled

@@ -1,0 +1,427 @@
+"""Plots show the numbers of the results."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from builders.cli_runner import run
+from conftest import REPOSITORY
+
+from usdhand import verbs as api
+from usdhand.evaluate.agreement import Agreement
+from usdhand.evaluate.reconstruction import METHODS, HandError
+from usdhand.fill import FillSettings, MotionLibrary
+from usdhand.fill.library import ARM_FPS
+from usdhand.fill.path import best_path
+from usdhand.fill.results import Filled
+from usdhand.motion import Clip
+from usdhand.reduce import Reduction, Statistics, pca_rms, thresholds_for_count
+from usdhand.reduce.search import channel_errors, errors_by_count
+from usdhand.report.plots import evaluating, filling, reducing, splicing, style
+from usdhand.report.splicing import splice_result
+from usdhand.splice import Spliced, SpliceSettings
+from usdhand.splice.markers import hand_markers
+from usdhand.splice.phases import derivative_signs, facing, steady_turns
+from usdhand.verbs import fill as fill_api
+from usdhand.verbs import splice as splice_api
+
+SAMPLES = REPOSITORY / "samples"
+FULL = SAMPLES / "conversations" / "talk_01_full.usdc"
+BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
+HANDS = SAMPLES / "hands" / "talk_01_hands_a.usdc"
+OK = SAMPLES / "gestures" / "ok_01.usdc"
+GESTURES = [SAMPLES / "gestures" / f"{x}.usdc" for x in ("ok_01", "ok_02", "big_01", "big_02")]
+PINS = ("1:1", "181:403")
+
+
+def part_of(clip: Clip, frames: slice) -> Clip:
+    return replace(
+        clip,
+        rotations=clip.rotations[frames],
+        translations=clip.translations[frames],
+        scales=clip.scales[frames],
+    )
+
+
+def lines(panel: Any) -> dict[str, Any]:
+    """Lines of a panel by their label."""
+    return {line.get_label(): line.get_xydata() for line in panel.get_lines()}
+
+
+@pytest.fixture(scope="module")
+def talk() -> Clip:
+    return api.read_clip(FULL)
+
+
+@pytest.fixture(scope="module")
+def reduction(talk: Clip) -> Reduction:
+    return api.reduce_hands([talk])[0]
+
+
+@pytest.fixture(scope="module")
+def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("library") / "gestures.usdc"
+    run("library", "build", *GESTURES, "-o", path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def library(library_file: Path) -> MotionLibrary:
+    return fill_api.read_library(library_file)
+
+
+@pytest.fixture(scope="module")
+def body() -> Clip:
+    return part_of(api.read_clip(BODY), slice(0, 240))
+
+
+@pytest.fixture(scope="module")
+def filled(body: Clip, library: MotionLibrary) -> Filled:
+    return fill_api.fill_fingers(body, library, FillSettings(k=3))
+
+
+@pytest.fixture(scope="module")
+def clips() -> tuple[Clip, Clip]:
+    return api.read_clip(BODY), api.read_clip(HANDS)
+
+
+@pytest.fixture(scope="module")
+def spliced(clips: tuple[Clip, Clip]) -> Spliced:
+    return splice_api.splice_hands(*clips, pins=PINS)
+
+
+# reduce
+
+
+def test_followers_lie_where_their_channels_are(reduction: Reduction) -> None:
+    figure = reducing.followers([reduction])
+    names = {r.name: r for r in reduction.rig.relations}
+    own = dict(zip(reduction.source.names, reduction.source.values.T, strict=True))
+    titles = [panel.get_title(loc="left") for panel in figure.axes]
+    assert len(titles) == reducing.MOST_FOLLOWERS
+    shown = []
+    for panel in figure.axes:
+        dependent, controller = (
+            text.removesuffix(", deg") for text in (panel.get_ylabel(), panel.get_xlabel())
+        )
+        relation = names[dependent]
+        assert relation.controllers == (controller,)
+        _, dots, line = panel.get_lines()
+        at = style.sampled(len(own[dependent]), reducing.SCATTER_POINTS)
+        expected = np.stack([own[controller][at], own[dependent][at]], axis=1)
+        assert np.array_equal(dots.get_xydata(), expected)
+        ends = line.get_xydata()
+        assert ends[:, 1] == pytest.approx(relation.offset + relation.slopes[0] * ends[:, 0])
+        shown.append(relation.rms_error)
+    assert shown == sorted(shown)
+    assert f"{shown[-1]:.1f} deg" in titles[-1]
+
+
+def test_several_controllers_are_drawn_against_the_first(talk: Clip) -> None:
+    [found] = api.reduce_hands([talk], free_channels=12, fit="least-squares", most_controllers=3)
+    relation = next(r for r in found.rig.relations if len(r.controllers) == 3)
+    figure = reducing.followers([found])
+    own = dict(zip(found.source.names, found.source.values.T, strict=True))
+    panels = [p for p in figure.axes if p.get_ylabel().startswith(f"{relation.name}, ")]
+    for panel in panels:
+        assert "less part of" in panel.get_ylabel()
+        x, y = panel.get_lines()[1].get_xydata().T
+        residual = y - relation.offset - relation.slopes[0] * x
+        at = style.sampled(len(talk), reducing.SCATTER_POINTS)
+        reduced = found.reduced.select([relation.name]).values[at, 0]
+        assert residual == pytest.approx(own[relation.name][at] - reduced, abs=1e-9)
+    assert panels
+
+
+def test_histograms_count_channels_and_pairs(reduction: Reduction) -> None:
+    figure = reducing.histograms([reduction])
+    curves = reduction.source.select(reduction.rig.names).values
+    counts = [sum(bar.get_height() for bar in panel.patches) for panel in figure.axes]
+    assert counts == [50, 1225, 1225]  # as in the paper
+    constant = sum(r.kind == "constant" for r in reduction.rig.relations)
+    labels = [panel.get_legend().get_texts()[0].get_text() for panel in figure.axes]
+    assert labels[0] == f"below 5 deg: {constant} channels"
+    standard = (curves - curves.mean(axis=0)) / curves.std(axis=0)
+    pairs = np.triu_indices(50, k=1)
+    close = [
+        int(
+            (
+                np.sqrt(np.mean((standard.T[pairs[0]] - s * standard.T[pairs[1]]) ** 2, 1)) < 0.5
+            ).sum()
+        )
+        for s in (1, -1)
+    ]
+    assert labels[1:] == [f"below 0.5: {n} pairs" for n in close]
+    assert sum(b.get_height() for b in figure.axes[1].patches[:5]) == close[0]
+
+
+def test_a_rig_of_other_clips_says_what_it_does(reduction: Reduction) -> None:
+    """Channels that do not move here, and those that the rig holds since they did not there."""
+    [found] = api.reduce_hands([api.read_clip(OK)], rig=reduction.rig)
+    constant = sum(r.kind == "constant" for r in found.rig.relations)
+    ranges = np.ptp(found.source.select(found.rig.names).values, axis=0)
+    still = int((ranges < found.rig.range_threshold).sum())
+    assert constant != still
+    legend = reducing.histograms([found]).axes[0].get_legend().get_texts()[0].get_text()
+    assert legend == f"below 5 deg: {still} channels\nthis rig holds {constant} constant"
+
+
+def test_curves_are_the_original_and_the_reduced_ones(reduction: Reduction) -> None:
+    figure = reducing.curves([reduction])
+    worst = np.argsort(-reduction.errors.rms)[: reducing.MOST_CURVES]
+    for panel, channel in zip(figure.axes, worst, strict=True):
+        name = reduction.errors.names[channel]
+        title = panel.get_title(loc="left")
+        assert title.startswith(f"{name} ")
+        assert f"{reduction.errors.rms[channel]:.1f} deg" in title
+        before, after = panel.get_lines()
+        assert np.array_equal(before.get_ydata(), reduction.source.select([name]).values[:, 0])
+        assert np.array_equal(after.get_ydata(), reduction.reduced.select([name]).values[:, 0])
+        assert before.get_xdata()[-1] == pytest.approx(reduction.clip.duration)
+
+
+def test_error_against_number_of_channels(reduction: Reduction) -> None:
+    figure = reducing.errors([reduction])
+    own = reduction.source.select(reduction.rig.names).values
+    statistics = Statistics.of(own)
+    drawn = lines(figure.axes[0])
+    for fit, label in (("paper", "the paper's fit"), ("least-squares", "least squares")):
+        curve = dict(drawn[f"one controller, {label}"])
+        for count in (0, 7, 20, 41):
+            best = channel_errors(statistics, thresholds_for_count(statistics, count, fit), fit)
+            assert curve[count] == pytest.approx(np.sqrt(np.mean(best**2)), rel=1e-9)
+    bound = dict(drawn["PCA: the least of any linear model"])
+    assert bound[20] == pytest.approx(pca_rms(own, 20))
+    [point] = next(xy for label, xy in drawn.items() if label.startswith("this rig"))
+    assert point.tolist() == pytest.approx([len(reduction.rig.free), reduction.errors.rms_deg])
+
+
+def test_counts_that_no_thresholds_leave_have_no_error() -> None:
+    t = np.linspace(0.0, 1.0, 50)
+    same = np.stack([t, t, t, np.sin(9 * t)], axis=1)  # three curves are free together or not
+    errors = errors_by_count(Statistics.of(30.0 * same))
+    assert np.isfinite(errors).tolist() == [True, True, True, False, True]
+    assert errors[2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_several_clips_are_one_motion() -> None:
+    found = api.reduce_hands([api.read_clip(path) for path in GESTURES[:2]])
+    figure = reducing.errors(found)
+    [point] = next(xy for label, xy in lines(figure.axes[0]).items() if "this rig" in label)
+    together = np.concatenate(
+        [
+            (r.reduced.select(r.rig.names).values - r.source.select(r.rig.names).values)
+            for r in found
+        ]
+    )
+    assert point[1] == pytest.approx(np.sqrt(np.mean(together**2)))
+    assert all("\nin ok_0" in p.get_title(loc="left") for p in reducing.curves(found).axes)
+
+
+def test_nothing_to_show_is_no_plot(talk: Clip) -> None:
+    [free] = api.reduce_hands([talk], range_deg=0.0)
+    assert set(reducing.figures([free])) == {"reduce_histograms", "reduce_errors"}
+    [still] = api.reduce_hands([api.read_clip(BODY)], preset=1)
+    assert set(reducing.figures([still])) == {"reduce_histograms", "reduce_errors"}
+
+
+# fill
+
+
+def test_speed_and_borders(filled: Filled, body: Clip) -> None:
+    part = filled.parts[0]
+    figure = filling.speed(part, body, api.find_hands(body))
+    [panel] = figure.axes
+    choices = part.alternatives[0].choices
+    borders = sorted({segment[0][0] for segment in panel.collections[0].get_segments()})
+    assert borders == pytest.approx([c.start for c in choices] + [choices[-1].end])
+    threshold, curve = panel.get_lines()
+    assert threshold.get_ydata()[0] == part.space.segmentation.speed
+    seconds, speed = curve.get_xydata().T
+    assert seconds[-1] == pytest.approx(body.duration, abs=1 / ARM_FPS)
+    # Borders lie where the speed crosses the threshold, or where a long part is slowest.
+    level = part.space.segmentation.speed
+    at = np.rint(np.array(borders[1:-1]) * ARM_FPS).astype(int)
+    crossing = (speed[at] > level) != (speed[at - 1] > level)
+    slowest = (speed[at] <= speed[at - 1]) & (speed[at] <= speed[at + 1])
+    assert (crossing | slowest).mean() > 0.7  # neither, where segments would be too short
+    assert crossing.any()
+
+
+def test_a_long_clip_is_shown_in_rows_of_its_first_minute(library: MotionLibrary) -> None:
+    clip = api.read_clip(BODY)
+    long = part_of(clip, np.tile(np.arange(len(clip)), 4))  # type: ignore[arg-type]
+    part = fill_api.fill_fingers(long, library, sides=("left",)).parts[0]
+    figure = filling.speed(part, long, api.find_hands(long))
+    assert len(figure.axes) == filling.MOST_ROWS
+    assert figure.axes[-1].get_xlim()[1] == pytest.approx(60.0)
+    assert "first 60 of 91 s" in figure.get_suptitle()
+
+
+def test_graph_has_costs_and_the_cheapest_path(filled: Filled, library: MotionLibrary) -> None:
+    part = filled.parts[0]
+    figure = filling.graph(part, library)
+    panel = figure.axes[0]
+    choices = part.alternatives[0].choices[: filling.MOST_LAYERS]
+    [path] = panel.get_lines()
+    assert path.get_ydata().tolist() == [c.chosen for c in choices]
+    # All transitions are there with the costs that the path was chosen by.
+    drawn = dict(
+        zip(
+            ((*a, b[1]) for a, b in panel.collections[0].get_segments()),
+            panel.collections[0].get_array(),
+            strict=True,
+        )
+    )
+    network = part.network
+    assert len(drawn) == sum(e.size for e in network.edges[: len(choices) - 1])
+    texts = {(t.get_position()): t.get_text() for t in panel.texts}
+    for x, (before, after) in enumerate(pairwise(choices)):
+        cost = drawn[(x, before.chosen, after.chosen)]
+        assert cost == pytest.approx(after.transition_cost)
+        assert texts[(x + 0.5, (before.chosen + after.chosen) / 2)] == f"{cost:.3g}"
+    for x, choice in enumerate(choices):
+        text = texts[(x, choice.chosen)]
+        segment = choice.candidates[choice.chosen].segment
+        assert library.clips[part.space.clips[segment]].name in text
+        assert f"cost {choice.node_cost:.3g}" in text
+
+
+def test_one_segment_has_room_for_its_caption(body: Clip, library: MotionLibrary) -> None:
+    short = part_of(body, slice(0, 8))
+    part = fill_api.fill_fingers(short, library, FillSettings(k=1), sides=("left",)).parts[0]
+    assert len(part.alternatives[0].choices) == 1
+    figure = filling.graph(part, library)
+    with style.look():
+        figure.draw_without_rendering()
+        whole = figure.bbox
+        words = [figure.axes[0].xaxis.label, *figure.axes[0].texts, *figure.texts]
+        boxes = [text.get_window_extent() for text in words]
+    assert len(boxes) == 3
+    assert all(whole.x0 <= b.x0 and b.x1 <= whole.x1 for b in boxes)
+    assert all(whole.y0 <= b.y0 and b.y1 <= whole.y1 for b in boxes)
+
+
+def test_the_network_is_what_the_path_was_found_in(filled: Filled) -> None:
+    settings = filled.settings
+    for part in filled.parts:
+        nodes = [layer.costs for layer in part.network.layers]
+        mean = [
+            np.mean(np.concatenate([np.ravel(x) for x in c])) for c in (nodes, part.network.edges)
+        ]
+        path = best_path(
+            [n * settings.segment_weight / mean[0] for n in nodes],
+            [e * settings.transition_weight / mean[1] for e in part.network.edges],
+        )
+        assert path.nodes == tuple(c.chosen for c in part.alternatives[0].choices)
+        assert path.cost == pytest.approx(part.alternatives[0].cost)
+
+
+# evaluate
+
+
+def test_evaluation() -> None:
+    confusion = np.array([[0.75, 0.25], [0.1, 0.9]])
+    agreements = [
+        Agreement("near", ("big", "ok"), 0.5, confusion[::-1], 10),
+        Agreement("best", ("big", "ok"), 0.8, confusion, 10),
+    ]
+    errors = [
+        HandError(take, side, method, i + frames / 10, 10.0 * i, 0.0, frames)
+        for take, frames in (("a", 10), ("b", 30))
+        for side in ("left", "right")
+        for i, method in enumerate(METHODS, 1)
+    ]
+    figures = evaluating.figures(agreements, errors)
+    assert tuple(figures) == evaluating.NAMES
+    bars = figures["evaluate_features"].axes[0].patches
+    assert [b.get_width() for b in bars] == pytest.approx([50.0, 80.0])
+    [matrix] = figures["evaluate_confusion"].axes
+    assert np.array_equal(matrix.images[0].get_array(), 100 * confusion)
+    assert [t.get_text() for t in matrix.texts] == ["75", "25", "10", "90"]
+    degrees, tips = figures["evaluate_fingers"].axes
+    mean = 0.25 * 1.0 + 0.75 * 3.0  # over frames
+    assert [b.get_width() for b in degrees.patches[:6]] == pytest.approx(np.arange(1, 7) + mean)
+    assert [b.get_width() for b in tips.patches[6:]] == pytest.approx(10.0 * np.arange(1, 7))
+    assert len(degrees.get_lines()[0].get_xydata()) == 2 * len(METHODS)
+    assert tuple(evaluating.figures([], errors)) == ("evaluate_fingers",)
+
+
+# splice
+
+
+def test_path_band_and_pins(spliced: Spliced, clips: tuple[Clip, Clip]) -> None:
+    body, hands = clips
+    settings = SpliceSettings()
+    found = [api.find_hands(clip) for clip in clips]
+    markers = [
+        hand_markers(clip, h, "left", settings.fps) for clip, h in zip(clips, found, strict=True)
+    ]
+    alignment = spliced.hands["left"]
+    figure = splicing.path("left", alignment, *markers, settings)
+    panel = figure.axes[0]
+    drawn = lines(panel)
+    assert np.isin(drawn["path"], alignment.warp).all()
+    low = drawn["band"]
+    inside = np.interp(drawn["path"][:, 0], *low.T) <= drawn["path"][:, 1] + 0.05
+    assert inside.all()
+    assert panel.get_xlim() == pytest.approx((0.0, 6.0), abs=0.05)
+    assert panel.get_ylim() == pytest.approx((0.0, hands.duration), abs=0.05)
+    [pins] = [c for c in panel.containers if c.get_label() == "pin"]
+    assert pins.lines[0].get_xydata().tolist() == [[p.body, p.hand] for p in alignment.pins]
+    assert len(splice_result(spliced)["hands"]["left"]["warp"]) == len(body)
+
+
+def test_cost_grid_is_the_mean_of_the_methods_own_costs(
+    spliced: Spliced, clips: tuple[Clip, Clip]
+) -> None:
+    from usdhand.dtw.phases import sign_costs
+
+    settings, alignment = SpliceSettings(), spliced.hands["left"]
+    ours, theirs = (
+        hand_markers(clip, api.find_hands(clip), "left", settings.fps) for clip in clips
+    )
+    shown = splicing.common_part(alignment)
+    rows, columns, costs = splicing.cost_grid(ours, theirs, alignment, settings, shown)
+    warp = np.interp(np.arange(len(ours)) / ours.fps, *alignment.warp.T) * theirs.fps
+    turned = facing(ours, -steady_turns(ours, theirs, warp))
+    signs = [
+        derivative_signs(m, settings.smoothing, settings.dead_zone, np.zeros(1))
+        for m in (turned, theirs)
+    ]
+    for i, j in ((3, 4), (100, 120), (240, 200)):
+        first, last = (np.rint(rows[i : i + 2] * ours.fps + 0.5)).astype(int)
+        left, right = (np.rint(columns[j : j + 2] * theirs.fps + 0.5)).astype(int)
+        block = [
+            sign_costs(signs[0][0][:, r : r + 1], signs[1][0], np.array([c]))[0]
+            for r in range(first, last)
+            for c in range(left, right)
+        ]
+        assert costs[i, j] == pytest.approx(np.mean(block))
+    along = np.interp((rows[1:] + rows[:-1]) / 2, *alignment.warp.T)
+    at = np.clip(np.searchsorted(columns, along) - 1, 0, costs.shape[1] - 1)
+    assert costs[np.arange(len(costs)), at].mean() < 0.5 * costs.mean()
+
+
+def test_hand_curves_meet_after_alignment(spliced: Spliced, clips: tuple[Clip, Clip]) -> None:
+    found = [api.find_hands(clip) for clip in clips]
+    figures = splicing.figures(spliced, *clips, *found, SpliceSettings())
+    assert set(figures) == set(splicing.NAMES)
+    axes = figures["splice_curves_left"].axes
+    bend_before, bend_after = (lines(panel) for panel in axes[2:4])
+
+    def apart(panel: dict[str, Any]) -> float:
+        body, hand = panel["body"], panel["hand clip"]
+        return float(np.abs(np.interp(body[:, 0], *hand.T) - body[:, 1]).mean())
+
+    assert apart(bend_after) < 0.25 * apart(bend_before)
+    name = axes[4].get_ylabel().partition(",")[0]
+    seconds, taken = lines(axes[5])["hand clip"].T
+    own = found[0].encode(spliced.clip).select([name]).values[:, 0]
+    own_times = np.arange(len(own)) / spliced.clip.fps
+    assert taken == pytest.approx(np.interp(seconds, own_times, own))

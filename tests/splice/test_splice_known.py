@@ -1,0 +1,392 @@
+"""Splice on pairs whose true alignment is known: samples always, real takes where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from builders.known_pairs import (
+    Pair,
+    arms_only,
+    known_pair,
+    known_pairs,
+    natural_offset,
+    with_other_axes,
+)
+from conftest import REPOSITORY, shared_data
+
+from usdhand.anatomy import Side
+from usdhand.motion import Clip, forward_kinematics
+from usdhand.motion import rotations as rot
+from usdhand.motion.resample import resample
+from usdhand.splice import Pin, Spliced, SpliceSettings, splice
+from usdhand.splice.markers import Markers
+from usdhand.splice.merge import with_fingers
+from usdhand.splice.method import align
+from usdhand.splice.phases import Align
+from usdhand.verbs import find_hands, read_clip
+from usdhand.verbs.splice import splice_hands
+
+SAMPLES = REPOSITORY / "samples"
+VISIBLE_S = 0.1  # Joerg, Hodgins & O'Sullivan 2010
+REAL = pytest.mark.real_data
+
+
+@cache
+def sample() -> Pair:
+    path = SAMPLES / "conversations" / "talk_01_full.usdc"
+    return known_pair(path, path, 3)
+
+
+@cache
+def real(index: int) -> Pair:
+    folder = shared_data("studiogalt", "full")
+    return known_pair(*known_pairs(folder)[index], 1000 + index)
+
+
+def spliced(pair: Pair, settings: SpliceSettings | None = None) -> Spliced:
+    return splice(pair.body, pair.hands, pair.body_hands, pair.hand_hands, settings)
+
+
+def check(pair: Pair) -> None:
+    result = spliced(pair)
+    true = pair.source_channels()
+    for side, alignment in result.hands.items():
+        moving = pair.moving(side)
+        full = np.abs(pair.error(alignment.warp[:, 1])[moving])
+        first = np.abs(pair.error(alignment.phase_warp)[moving])
+        for error in (full, first):
+            assert np.median(error) < 0.015
+            assert np.percentile(error, 95) < 0.05
+            assert error.max() < VISIBLE_S
+        assert np.median(full) < np.median(first) + 0.002
+        assert (np.diff(alignment.warp[:, 1]) >= 0).all()
+        ours = pair.body_hands.encode(result.clip).select(alignment.channels).values
+        assert np.sqrt(np.mean((ours - true.select(alignment.channels).values) ** 2)) < 2.0
+
+
+def test_a_sample_conversation() -> None:
+    check(sample())
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("index", [0, 6, 20, 40])
+def test_real_takes(index: int) -> None:
+    check(real(index))
+
+
+@pytest.mark.slow
+@pytest.mark.real_data
+def test_all_real_takes_by_local_turns_and_by_trunks() -> None:
+    """The figures of docs/splice-figures.md, with other warps, turns and noise than there."""
+    pairs = known_pairs(shared_data("studiogalt", "full"))
+    errors: dict[str, list[np.ndarray]] = {"full": [], "first": []}
+    for i, (body, hands) in enumerate(pairs):
+        pair = known_pair(body, hands, 3000 + i)
+        result = spliced(pair, SpliceSettings(align="trunk" if i % 2 else "local"))
+        for side, alignment in result.hands.items():
+            moving = pair.moving(side)
+            errors["full"].append(np.abs(pair.error(alignment.warp[:, 1])[moving]))
+            errors["first"].append(np.abs(pair.error(alignment.phase_warp)[moving]))
+    full, first = (np.concatenate(errors[name]) for name in ("full", "first"))
+    for error in (full, first):
+        assert np.median(error) < 0.01
+        assert np.percentile(error, 95) < 0.05
+    assert np.mean(full > VISIBLE_S) < 0.001
+    assert np.mean(first > VISIBLE_S) < 0.01
+    for statistic in (np.median, np.max, lambda e: np.percentile(e, 95)):
+        assert statistic(full) < statistic(first)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    "name",
+    [
+        "SG_ASL_Abate_2_2023_2_3",
+        "SG_ASL_Abscond_2023_2_8",
+        "SG_ASL_7_2023_1_29",  # of the left hand, little but the clip's first frames moves
+        "SG_ASL_ABC_2023_2_3",
+    ],
+)
+def test_both_rigs_of_a_take_within_a_frame_without_being_told(name: str) -> None:
+    mini = shared_data("studiogalt", "mini")
+    a, b = read_clip(mini.parent / "full" / f"{name}.usdc"), read_clip(mini / f"{name}.usdc")
+    hands_a, hands_b = find_hands(a), find_hands(b)
+    first, second = natural_offset(a, b, hands_a, hands_b)
+    result = splice(a, b, hands_a, hands_b)
+    pair = Pair(name, a, b, hands_a, hands_b, b, np.empty(0))
+    for side, alignment in result.hands.items():
+        frames = np.flatnonzero(pair.moving(side))
+        off = alignment.warp[frames, 1] * b.fps - (frames - first + second)
+        assert np.abs(off).max() <= 1.0
+
+
+def test_only_fingers_change() -> None:
+    pair = sample()
+    result = spliced(pair)
+    fingers = [int(j) for f in pair.body_hands.frames.values() for j in f.joints]
+    others = np.setdiff1d(np.arange(len(pair.body.skeleton)), fingers)
+    assert np.array_equal(result.clip.rotations[:, others], pair.body.rotations[:, others])
+    assert result.clip.translations is pair.body.translations
+
+
+@pytest.mark.parametrize("make", [sample, pytest.param(lambda: real(9), marks=REAL)])
+def test_fingers_accelerate_no_more_than_with_the_true_warp(make: Callable[[], Pair]) -> None:
+    pair = make()
+
+    def largest(clip: Clip) -> float:
+        values = pair.body_hands.encode(clip).values
+        return float(np.abs(np.diff(values, n=2, axis=0)).max())
+
+    true = pair.body
+    for side, frames in pair.body_hands.frames.items():
+        true, _ = with_fingers(true, pair.hands, frames, pair.hand_hands.frames[side], pair.truth)
+    assert largest(spliced(pair).clip) < 1.3 * largest(true)
+
+
+def test_a_pin_moves_the_warp_only_around_it() -> None:
+    pair = sample()
+    free = spliced(pair).hands["right"].warp
+    at = 340
+    pins = (Pin(free[at, 0], free[at, 1] + 0.2), Pin(*free[250]), Pin(*free[430]))
+    pinned = spliced(pair, SpliceSettings(pins=pins)).hands["right"].warp
+    assert abs(pinned[at, 1] - free[at, 1] - 0.2) < 1e-6
+    apart = np.abs(pinned[:, 1] - free[:, 1]) * pair.moving("right")
+    assert apart[:250].max() < 0.03
+    assert apart[431:].max() < 0.03
+    loose = (replace(pins[0], tolerance=0.15), *pins[1:])
+    held = spliced(pair, SpliceSettings(pins=loose)).hands["right"].warp
+    assert 0.05 - 1e-6 <= abs(held[at, 1] - free[at, 1]) <= 0.35
+    one_hand = SpliceSettings(pins=(replace(pins[0], side="right"),))
+    hands = spliced(pair, one_hand).hands
+    assert np.array_equal(hands["left"].warp, spliced(pair).hands["left"].warp)
+
+
+@pytest.mark.parametrize(
+    ("pins", "near"),
+    [
+        (["300:300", "301:303"], 3.0),
+        (["300:300", "301:306"], 3.0),
+        (["300:306"], 3.0),
+        (["300:300", "310:300"], 3.0),
+        (["300:300", "301:361", "302:362"], 1.0),
+    ],
+)
+def test_pins_that_change_the_speed_do_not_swing(pins: list[str], near: float) -> None:
+    """Both clips are the same take, all is right but the pins: before them little may move."""
+    folder = SAMPLES / "conversations"
+    body, hands = read_clip(folder / "talk_01_body.usdc"), read_clip(folder / "talk_01_full.usdc")
+    found = splice_hands(body, hands, pins=pins, sides=["right"]).hands["right"]
+    off = found.warp[:, 1] * hands.fps - np.arange(len(body))
+    assert np.abs(off[[279, 287, 290]]).max() < near
+    assert np.abs(off[[99, 399, 499]]).max() < 0.5
+
+
+def test_true_pins_do_no_harm() -> None:
+    pair = sample()
+    at = np.linspace(0, len(pair.body) - 1, 10).astype(int)[1:-1]
+    pins = tuple(Pin(t / pair.body.fps, pair.truth[t]) for t in at)
+    free, pinned = spliced(pair).hands, spliced(pair, SpliceSettings(pins=pins)).hands
+    for side, moving in ((s, pair.moving(s)) for s in free):
+        before, after = (np.abs(pair.error(h[side].warp[:, 1])[moving]) for h in (free, pinned))
+        assert np.median(after) < np.median(before) + 0.0005
+        assert after.max() < max(before.max() + 0.01, 0.05)
+
+
+@pytest.mark.parametrize("count", [2, 30, 120])
+def test_true_pins_around_frames_that_were_held(count: int) -> None:
+    """The hand clip shows its frames before 300 twice; pins say so."""
+    folder = SAMPLES / "conversations"
+    body, full = read_clip(folder / "talk_01_body.usdc"), read_clip(folder / "talk_01_full.usdc")
+    at = np.concatenate([np.arange(300), np.arange(300 - count, len(full))])
+    longer = replace(
+        full,
+        **{k: getattr(full, k)[at] for k in ("rotations", "translations", "scales")},
+    )
+    pins = ["300:300", f"301:{301 + count}"]
+    true = np.arange(len(body)) + np.where(np.arange(len(body)) < 300, 0, count)
+    for alignment in splice_hands(body, longer, pins=pins).hands.values():
+        off = np.abs(alignment.warp[:, 1] * full.fps - true) / full.fps
+        assert off.max() < VISIBLE_S
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(("body", "hands"), [(3, 6), (30, 9), (5, 33)])
+def test_three_pins_on_another_sign_act_between_them_only(body: int, hands: int) -> None:
+    """The hand clip shows another sign: much is ambiguous, and pins still act locally."""
+    files = [files[0] for files in known_pairs(shared_data("studiogalt", "full"))]
+    a, b = read_clip(files[body]), read_clip(files[hands])
+    found = find_hands(a), find_hands(b)
+    free = splice(a, b, *found).hands
+    warp = free["right"].warp
+    first, at, last = (round(share * len(a)) for share in (0.35, 0.5, 0.65))
+    moved = min(warp[at, 1] + 0.15, warp[last, 1] - 0.02)
+    pins = (Pin(*warp[first]), Pin(warp[at, 0], moved), Pin(*warp[last]))
+    pins = tuple(replace(pin, side="right") for pin in pins)
+    pinned = splice(a, b, *found, SpliceSettings(pins=pins)).hands
+    if pinned["left"].taken_from is None:
+        assert np.array_equal(pinned["left"].warp, free["left"].warp)
+    apart = np.abs(pinned["right"].warp[:, 1] - warp[:, 1])
+    assert pinned["right"].warp[at, 1] == pytest.approx(moved, abs=1e-6)
+    assert max(apart[first], apart[last]) < 1e-6
+    assert max(apart[:first].max(), apart[last:].max()) < 2.5 / a.fps
+
+
+def test_every_frame_pinned_is_full_control() -> None:
+    pair = sample()
+    pins = tuple(
+        Pin(t, s)
+        for t, s in zip(np.arange(len(pair.body)) / pair.body.fps, pair.truth, strict=True)
+    )
+    end = pair.hands.duration
+    pins = tuple(replace(p, hand=min(p.hand, end)) for p in pins)
+    for alignment in spliced(pair, SpliceSettings(pins=pins)).hands.values():
+        assert np.abs(alignment.warp[:, 1] - [p.hand for p in pins]).max() < 1e-9
+
+
+def test_counting_every_left_step() -> None:
+    """The paper's example: the hand counts to three while the body waves six times.
+
+    Without pins, every count is spread over two waves. Pins let it count every second wave: there
+    the count has the timing of the wave, and waits for the other one.
+    """
+    body, hands = waves(6), waves(3)
+    times = np.arange(len(body)) / 60.0
+    pins = [Pin(t, s) for k in range(3) for t, s in ((2.0 * k, k), (2.0 * k + 1.0, k + 1.0))][1:]
+    free, _, _ = align(body, hands, SpliceSettings(), (), times)
+    pinned, _, _ = align(body, hands, SpliceSettings(), pins, times)
+    for wave in range(6):
+        inside = (times > wave + 0.2) & (times < wave + 0.8)
+        wanted = times[inside] - (wave + 1) // 2 if wave % 2 == 0 else np.full(36, wave // 2 + 1.0)
+        wanted = wanted[: inside.sum()]
+        off = np.abs(pinned[inside] - wanted)
+        assert off.max() < 0.12, wave
+    middle = np.interp(2.5, times, free)
+    assert abs(middle - np.interp(2.5, times, pinned)) > 0.1
+
+
+def waves(count: int) -> Markers:
+    """Markers of a hand that rises and comes down again once a second, resting in between."""
+    t = np.arange(60 * count + 1) / 60.0
+    phase = np.clip((t % 1.0 - 0.2) / 0.6, 0.0, 1.0)
+    up = 20.0 * np.sin(np.pi * phase) ** 2
+    wrist = np.stack([10.0 * np.sin(2 * np.pi * phase), up, 0.3 * up], axis=1)
+    around = np.array([[3.0, 0.0, 0.0], [-3.0, 0.0, 0.0], [0.0, 0.0, -8.0], [0.0, 0.0, 8.0]])
+    forearm = np.tile([0.0, 0.0, 1.0], (len(t), 1))
+    return Markers(wrist[:, None] + around, wrist, forearm, None, 60.0, "shoulder")
+
+
+def test_wrists_come_along_where_wanted() -> None:
+    pair = sample()
+    hands = resample(pair.source, 60.0)
+    result = splice(
+        pair.body, hands, pair.body_hands, find_hands(hands), SpliceSettings(wrist="hands")
+    )
+    for hand in pair.body_hands.character.hands.values():
+        turned = rot.angle_between(
+            result.clip.rotations[:, hand.wrist], pair.source.rotations[:, hand.wrist]
+        )
+        assert turned.max() < 3.0
+    other = pair.body.rotations.copy()
+    other[:, [h.wrist for h in pair.body_hands.character.hands.values()]] = rot.IDENTITY
+    fixed = splice(
+        pair.body.with_rotations(other),
+        hands,
+        pair.body_hands,
+        find_hands(hands),
+        SpliceSettings(wrist="hands"),
+    )
+    for side, hand in pair.body_hands.character.hands.items():
+        at = fixed.hands[side].warp[:, 1] * 30.0
+        wanted = pair.source.rotations[np.rint(at).astype(int), hand.wrist]
+        apart = rot.angle_between(fixed.clip.rotations[:, hand.wrist], wanted)
+        assert np.median(apart) < 2.0
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("how", ["local", "trunk"])
+def test_rigs_with_other_axes_give_the_same(how: Align) -> None:
+    """And wrists of another rig come as they were captured on this one."""
+    full = shared_data("studiogalt", "full") / "SG_ASL_Abscond_2023_2_8.usdc"
+    a, b = read_clip(full), read_clip(full.parent.parent / "mini" / full.name)
+    wrists = [h.wrist for h in find_hands(a).character.hands.values()]
+    stiff = a.rotations.copy()
+    stiff[:, wrists] = stiff[:1, wrists]
+    settings = SpliceSettings(align=how, wrist="hands")
+
+    def result(body: Clip, hands: Clip) -> Clip:
+        return splice(body, hands, find_hands(body), find_hands(hands), settings).clip
+
+    plain = result(a.with_rotations(stiff), b)
+    turned = rot.angle_between(plain.rotations[:, wrists], a.rotations[:, wrists])
+    assert turned.max() < 1.5
+    other = result(with_other_axes(a.with_rotations(stiff), 1), with_other_axes(b, 2))
+    ours, theirs = (forward_kinematics(clip).positions for clip in (plain, other))
+    assert np.abs(ours - theirs).max() < 0.01
+
+
+@pytest.mark.real_data
+def test_a_hand_that_hardly_moves_follows_the_other() -> None:
+    """Of 7 the left hand goes a centimetre, the right one 30."""
+    full = shared_data("studiogalt", "full") / "SG_ASL_7_2023_1_29.usdc"
+    a, b = read_clip(full), read_clip(full.parent.parent / "mini" / full.name)
+    result = splice(a, b, find_hands(a), find_hands(b))
+    assert result.hands["left"].taken_from == "right"
+    assert np.array_equal(result.hands["left"].warp, result.hands["right"].warp)
+    assert any("left hand hardly moves" in note for note in result.notes)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    ("sides", "role"), [(("left", "right"), "elbow"), (("right",), "elbow"), (("right",), "wrist")]
+)
+def test_forearms_or_hands_alone(sides: tuple[Side, ...], role: str) -> None:
+    pair = real(20)
+    hands = pair.hand_hands.character.hands
+    part = arms_only(pair.hands, [getattr(hands[side], role) for side in sides])
+    result = splice(pair.body, part, pair.body_hands, find_hands(part))
+    assert tuple(result.hands) == sides
+    for side, alignment in result.hands.items():
+        assert alignment.origins[1] == "the room"
+        error = np.abs(pair.error(alignment.warp[:, 1])[pair.moving(side)])
+        assert np.median(error) < 0.01
+        assert error.max() < VISIBLE_S
+
+
+@pytest.mark.real_data
+def test_size_rate_and_start_do_not_matter() -> None:
+    full = shared_data("studiogalt", "full") / "SG_ASL_Abhor_2_2023_2_4.usdc"
+    a, b = read_clip(full), read_clip(full.parent.parent / "mini" / full.name)
+    hands = find_hands(a), find_hands(b)
+    plain = splice(a, b, *hands).hands
+    tiny = replace(
+        b,
+        translations=0.01 * b.translations,
+        skeleton=replace(b.skeleton, bind=_scaled(b.skeleton.bind), rest=_scaled(b.skeleton.rest)),
+        origin=replace(b.origin, first_time_code=1001.0),
+    )
+    for clip, tolerance in ((tiny, 1e-4), (resample(b, 24.0), 0.02), (resample(b, 120.0), 0.004)):
+        other = splice(a, clip, hands[0], find_hands(clip)).hands
+        for side, alignment in other.items():
+            apart = np.abs(alignment.warp[:, 1] - plain[side].warp[:, 1])
+            assert np.median(apart) < tolerance
+            assert apart.max() < 5 * tolerance
+
+
+def _scaled(matrices: np.ndarray) -> np.ndarray:
+    """Matrices whose translation is a hundredth of what it was."""
+    scaled = matrices.copy()
+    scaled[:, :3, 3] *= 0.01
+    return scaled
+
+
+@pytest.mark.parametrize("how", ["local", "trunk"])
+def test_a_turned_clip_is_aligned_as_well(how: str) -> None:
+    pair = sample()
+    result = spliced(pair, SpliceSettings(align=how))  # type: ignore[arg-type]
+    for side, alignment in result.hands.items():
+        error = np.abs(pair.error(alignment.warp[:, 1])[pair.moving(side)])
+        assert np.median(error) < 0.025

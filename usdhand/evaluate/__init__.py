@@ -1,0 +1,1 @@
+"""How near one motion is to another: compare, reconstruction, label agreement."""

@@ -1,0 +1,153 @@
+"""Arms that end without fingers: found by names, with the names that fingers would have there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from usdhand.anatomy import SIDES, CharacterMap, Side
+from usdhand.anatomy.hand import ARM_JOINTS, BODY_JOINTS, HAND_JOINTS, HandMap
+from usdhand.motion.skeleton import Skeleton, leaf_name
+from usdhand.rigs import Conventions, load_conventions
+from usdhand.rigs.body import arm_joints, body_of
+from usdhand.rigs.conventions import Convention, name_key
+from usdhand.rigs.naming import Rig
+
+# A wrist with more joints below it, thumb aside, has fingers, whatever they are called. A mitten
+# has up to three: a hand, all fingers in one, an end.
+MOST_WITHOUT_FINGERS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class BareArms:
+    """Arms of a skeleton that has no fingers there.
+
+    Attributes
+    ----------
+    character : hands without joints, and the body joints that go with them
+    convention : whose names the skeleton has, None where a map file names the wrists
+    """
+
+    character: CharacterMap
+    convention: Convention | None
+
+
+@dataclass(frozen=True)
+class _Match:
+    """A convention's arms in a rig: side -> role -> joint."""
+
+    convention: Convention
+    arms: Mapping[Side, Mapping[str, int]]
+    body: Mapping[str, int]
+    rank: tuple[int, int, int]
+
+
+def bare_arms(skeleton: Skeleton, conventions: Conventions | None = None) -> BareArms | None:
+    """Arms without fingers, by the names of their joints; None if there are none.
+
+    Wrists that a map file names win over known conventions.
+    """
+    conventions = conventions or load_conventions()
+    rig = Rig(skeleton)
+    found = max(_matches(rig, conventions.conventions), key=lambda m: m.rank, default=None)
+    arms: dict[Side, dict[str, int]] = {}
+    for side in SIDES:
+        own = dict(found.arms.get(side, {})) if found else {}
+        named = conventions.explicit.get(side, {})
+        own |= {
+            r: j for r in ARM_JOINTS if r in named and (j := skeleton.find(named[r])) is not None
+        }
+        if "wrist" in own and _is_bare(rig, own["wrist"]):
+            arms[side] = own
+    if not arms:
+        return None
+    wrists = [arm["wrist"] for arm in arms.values()]
+    body: dict[str, Any] = dict(body_of(skeleton, rig.points, wrists).joints)
+    body |= found.body if found else {}
+    hands: dict[Side, HandMap] = {}
+    for side, arm in arms.items():
+        by_hierarchy = arm_joints(skeleton, rig.points, arm["wrist"], body.get("chest"))
+        whole: dict[str, Any] = by_hierarchy | arm
+        hands[side] = HandMap(side, joints={}, **whole)
+    named_by_file = any("wrist" in conventions.explicit.get(side, {}) for side in arms)
+    convention = None if named_by_file or found is None else found.convention
+    name = convention.name if convention else "map file"
+    return BareArms(CharacterMap(hands, name, **body), convention)
+
+
+def finger_names(
+    skeleton: Skeleton, arms: BareArms, side: Side, roles: Sequence[str], conventions: Conventions
+) -> dict[str, str]:
+    """Leaf names for the joints of a hand, in the skeleton's own manner of naming.
+
+    Where that has no names for fingers, or another joint bears one of them, names are those of the
+    first convention that shares none with it. Metacarpals and tips that a convention does not name
+    are left out.
+    """
+    wrist = arms.character.hands[side].wrist
+    taken = {name_key(name) for name in skeleton.names}
+    needed = [role for role in roles if role in HAND_JOINTS]
+    own = [arms.convention] if arms.convention else []
+    for convention in (*own, *conventions.conventions):
+        names = convention.hands.get(side, {})
+        affixes = ("", "")
+        if convention is arms.convention:
+            affixes = _affixes(leaf_name(skeleton.joints[wrist]), names.get("wrist", ()))
+        found = {r: affixes[0] + names[r][0] + affixes[1] for r in roles if r in names}
+        keys = {name_key(name) for name in found.values()}
+        whole = all(role in found for role in needed) and len(keys) == len(found)
+        if whole and not keys & taken:
+            return found
+        if convention is arms.convention:
+            taken |= keys
+    raise AssertionError("no convention has free names")  # they are some thirty, all different
+
+
+def _is_bare(rig: Rig, wrist: int) -> bool:
+    below = [j for j in range(len(rig.names)) if wrist in rig.above[j]]
+    return sum("thumb" not in rig.path(j).lower() for j in below) <= MOST_WITHOUT_FINGERS
+
+
+def _matches(rig: Rig, conventions: Sequence[Convention]) -> Iterator[_Match]:
+    for number, convention in enumerate(conventions):
+        keys = convention.hand_keys
+        wrists = {n for side in SIDES for n in keys.get(side, {}).get("wrist", ())}
+        affixes = {
+            (key[:start], key[start + len(name) :])
+            for key in rig.by_key
+            for name in wrists
+            if (start := key.rfind(name)) >= 0
+        }
+        for prefix, suffix in affixes:
+
+            def joint(
+                names: Sequence[str], pre: str = prefix, post: str = suffix
+            ) -> tuple[int, ...]:
+                """The one joint with the first of these names that a joint has."""
+                found = (rig.by_key[k] for n in names if (k := pre + n + post) in rig.by_key)
+                return next((joints for joints in found if len(joints) == 1), ())
+
+            arms: dict[Side, dict[str, int]] = {}
+            for side in SIDES:
+                roles = keys.get(side, {})
+                own = {r: j[0] for r in ARM_JOINTS if (j := joint(roles.get(r, ())))}
+                if "wrist" in own:
+                    above = rig.above[own["wrist"]]
+                    arms[side] = {r: j for r, j in own.items() if r == "wrist" or j in above}
+            if not arms:
+                continue
+            body = {r: j[0] for r in BODY_JOINTS if (j := joint(convention.body_keys.get(r, ())))}
+            matched = sum(map(len, arms.values())) + len(body)
+            rank = (matched, -len(prefix) - len(suffix), -number)
+            yield _Match(convention, arms, body, rank)
+
+
+def _affixes(leaf: str, wrists: Sequence[str]) -> tuple[str, str]:
+    """What stands before and behind a wrist's name, as it is spelled."""
+    for wrist in map(name_key, wrists):
+        for start in reversed(range(len(leaf))):
+            for end in range(start + 1, len(leaf) + 1):
+                if name_key(leaf[start:end]) == wrist and leaf[start].isalnum():
+                    return leaf[:start], leaf[end:]
+    return "", ""

@@ -1,0 +1,277 @@
+"""How rigs name their joints: the conventions of ``conventions.toml`` and of users' map files."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from usdhand.anatomy.hand import (
+    ARM_JOINTS,
+    BODY_JOINTS,
+    DIGITS,
+    FINGERS,
+    HAND_JOINTS,
+    SIDES,
+    Side,
+    digit_joints,
+)
+from usdhand.errors import UsageError
+
+Table = dict[str, Any]
+Names = tuple[str, ...]
+
+# Roles beside the fifteen joints: "IndexMetacarpal", "ThumbTip"; "ThumbCarpal" lies before the CMC.
+METACARPALS: dict[str, str] = {d: f"{d}Metacarpal" for d in FINGERS}
+TIPS: dict[str, str] = {d: f"{d}Tip" for d in DIGITS}
+THUMB_CARPAL = "ThumbCarpal"
+HAND_ROLES: tuple[str, ...] = (
+    *ARM_JOINTS,
+    *HAND_JOINTS,
+    *METACARPALS.values(),
+    *TIPS.values(),
+    THUMB_CARPAL,
+)
+
+_SETTINGS = ("about", "like", "side", "digit", "prefix")
+_SHORTHANDS = ("thumb", "thumb_tip", "thumb_carpal", "finger", "metacarpal", "tip")
+_KEYS = {*_SETTINGS, *_SHORTHANDS, *BODY_JOINTS, *HAND_ROLES}
+
+
+def name_key(name: str) -> str:
+    """Spelling-free form of a joint name: letters and digits only, in lower case.
+
+    Exporters turn separators into others or drop them, so ``hand.L``, ``hand_L`` and ``HandL``
+    are one name. Maya writes them into FBX as codes: ``handFBXASC046L``.
+    """
+    if "FBXASC" in name:
+        name = re.sub(r"FBXASC\d{3}", "", name)
+    return "".join(filter(str.isalnum, name)).lower()
+
+
+@dataclass(frozen=True)
+class Convention:
+    """The joint names of one kind of rig.
+
+    Attributes
+    ----------
+    name : the table's name
+    hands : side -> role ("wrist", "IndexMCP", "IndexTip") -> alternative names; the only side is
+        None where names do not tell the side
+    body : "hips", "chest", ... -> alternative names
+    prefixes : prefixes that belong to the convention, most wanted first
+    own : True for a convention from a user's file
+    """
+
+    name: str
+    hands: Mapping[Side | None, Mapping[str, Names]]
+    body: Mapping[str, Names]
+    prefixes: Names = ()
+    own: bool = False
+
+    @cached_property
+    def hand_keys(self) -> Mapping[Side | None, Mapping[str, Names]]:
+        """``hands`` with the names' spelling-free forms."""
+        return {side: _keys(roles) for side, roles in self.hands.items()}
+
+    @cached_property
+    def body_keys(self) -> Mapping[str, Names]:
+        """``body`` with the names' spelling-free forms."""
+        return _keys(self.body)
+
+    @cached_property
+    def prefix_keys(self) -> Names:
+        """Spelling-free forms of ``prefixes``."""
+        return tuple(name_key(p) for p in self.prefixes)
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """All conventions in order of preference, and joints that a user named one by one.
+
+    ``explicit`` holds the tables ``[left]``, ``[right]``, ``[body]`` of map files: role -> joint.
+    """
+
+    conventions: tuple[Convention, ...]
+    explicit: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+
+def load_conventions(*extra: Path) -> Conventions:
+    """Read the packaged conventions and users' files on top of them.
+
+    Parameters
+    ----------
+    extra : map files; a later file wins over an earlier one, all win over the package
+
+    Raises
+    ------
+    UsageError
+        A file cannot be read or a key is wrong; the message names both.
+    """
+    if not extra:
+        return _packaged()
+    tables = dict(_packaged_tables())
+    own: dict[str, str] = {}  # convention -> its file, the latest file first
+    explicit: dict[str, dict[str, str]] = {}
+    for path in extra:
+        for name, table in _read(path).items():
+            where = f"{path}: [{name}]"
+            if not isinstance(table, dict):
+                raise UsageError(f"{path}: '{name}' stands outside a table; see {_EXAMPLE}")
+            if name in (*SIDES, "body"):
+                explicit.setdefault(name, {}).update(_explicit(table, name, where))
+            else:
+                _check(table, where)
+                tables[name] = table
+                own = {name: str(path)} | {n: p for n, p in own.items() if n != name}
+    user = tuple(_convention(name, tables, file, own=True) for name, file in own.items())
+    packaged = tuple(c for c in _packaged().conventions if c.name not in own)
+    return Conventions((*user, *packaged), explicit)
+
+
+_EXAMPLE = "usdhand/anatomy/conventions.toml for the format"
+
+
+@cache
+def _packaged_tables() -> dict[str, Table]:
+    text = resources.files("usdhand.rigs").joinpath("conventions.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+@cache
+def _packaged() -> Conventions:
+    tables = _packaged_tables()
+    return Conventions(tuple(_convention(name, tables, "conventions.toml") for name in tables))
+
+
+def _read(path: Path) -> Table:
+    try:
+        return tomllib.loads(Path(path).read_text("utf-8"))
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: is no valid TOML: {error}") from error
+
+
+def _explicit(table: Table, name: str, where: str) -> dict[str, str]:
+    allowed = BODY_JOINTS if name == "body" else HAND_ROLES
+    for key, value in table.items():
+        if key not in allowed:
+            raise UsageError(f"{where} {key}: no such joint; one of {', '.join(allowed)}")
+        if not isinstance(value, str) or not value:
+            raise UsageError(f"{where} {key}: must be the name of a joint, not {value!r}")
+    return table
+
+
+def _check(table: Table, where: str) -> None:
+    """Refuse a convention whose keys or values are not of the documented form."""
+    for key, value in table.items():
+        if key not in _KEYS:
+            raise UsageError(f"{where} {key}: unknown key; one of {', '.join(sorted(_KEYS))}")
+        if key in ("about", "like"):
+            good, form = isinstance(value, str), "a string"
+        elif key in ("side", "digit"):
+            count = 2 if key == "side" else 4
+            good, form = _is_list(value) and len(value) == count, f"a list of {count} strings"
+        elif key in ("thumb", "finger"):
+            good = isinstance(value, list) and len(value) == 3 and all(map(_is_name, value))
+            form = "a list of three names"
+        else:
+            good, form = _is_name(value), "a name or a list of names"
+        if not good:
+            raise UsageError(f"{where} {key}: must be {form}, not {value!r}")
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(v, str) and v for v in value)
+
+
+def _is_name(value: object) -> bool:
+    return (isinstance(value, str) and value != "") or (_is_list(value) and bool(value))
+
+
+def _inherit(name: str, tables: Mapping[str, Table], where: str) -> Table:
+    """Return a table completed by the one it is like; the table's own keys win."""
+    table, seen = dict(tables[name]), [name]
+    while (parent := table.pop("like", None)) is not None:
+        if parent not in tables or parent in seen:
+            raise UsageError(f"{where}: [{name}] like: no other convention named {parent!r}")
+        seen.append(parent)
+        # A prefix or a description belongs to one convention only.
+        inherited = {k: v for k, v in tables[parent].items() if k not in ("prefix", "about")}
+        table = inherited | table
+        if "like" in inherited:
+            table["like"] = inherited["like"]
+    return table
+
+
+def _convention(
+    name: str, tables: Mapping[str, Table], where: str, own: bool = False
+) -> Convention:
+    table = _inherit(name, tables, where)
+    spelled = dict(_spelled_out(table))
+    spellings: list[tuple[Side | None, str]] = [(None, "")]
+    if "side" in table:
+        spellings = list(zip(SIDES, table["side"], strict=True))
+    hands: dict[Side | None, dict[str, Names]] = {}
+    for side, spelling in spellings:
+        hands[side] = {
+            role: tuple(n.replace("{side}", spelling).replace("{s}", spelling[:1]) for n in names)
+            for role, names in spelled.items()
+        }
+    body = {role: _names(table[role]) for role in BODY_JOINTS if role in table}
+    return Convention(name, hands, body, _names(table.get("prefix", [])), own)
+
+
+def _spelled_out(table: Table) -> Iterator[tuple[str, Names]]:
+    """Roles of one hand and their names, ``{digit}`` filled in, ``{side}`` not yet."""
+    for digit, spelling in zip(DIGITS, ["", *table.get("digit", FINGERS)], strict=True):
+        thumb = digit == "Thumb"
+        templates = dict(
+            zip(
+                (digit + joint for joint in digit_joints(digit)),
+                table.get("thumb" if thumb else "finger", ()),
+                strict=False,
+            )
+        )
+        templates[TIPS[digit]] = table.get("thumb_tip" if thumb else "tip", ())
+        inner = THUMB_CARPAL if thumb else METACARPALS[digit]
+        templates[inner] = table.get("thumb_carpal" if thumb else "metacarpal", ())
+        for role, value in templates.items():
+            if names := _names(value):
+                yield role, tuple(n.replace("{digit}", spelling) for n in names)
+    for role in HAND_ROLES:
+        if role in table:
+            yield role, _names(table[role])
+
+
+def _names(value: str | list[str] | Names) -> Names:
+    return (value,) if isinstance(value, str) else tuple(value)
+
+
+def _keys(roles: Mapping[str, Names]) -> dict[str, Names]:
+    return {role: tuple(map(name_key, names)) for role, names in roles.items()}
+
+
+_SIDE_WORDS: dict[str, Side] = {
+    **dict.fromkeys(("left", "lft", "lf", "l"), "left"),
+    **dict.fromkeys(("right", "rgt", "rt", "r"), "right"),
+}
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+
+
+def named_side(joint: str) -> Side | None:
+    """Side that a joint path speaks of, the nearest name first; None if it says nothing.
+
+    Whole words only: ``Hand_L`` and ``leftHand`` have a side, ``Belly`` has none.
+    """
+    for name in reversed(joint.split("/")):
+        sides = {_SIDE_WORDS.get(word.lower()) for word in _WORD.findall(name)} - {None}
+        if sides:
+            return sides.pop() if len(sides) == 1 else None
+    return None

@@ -1,0 +1,62 @@
+"""The verbs of usdhand as functions on values; what is odd comes back beside the result.
+
+Example
+-------
+>>> import usdhand                                             # doctest: +SKIP
+>>> clip = usdhand.read_clip("samples/gestures/ok_01.usdc")    # doctest: +SKIP
+>>> [reduction] = usdhand.reduce_hands([clip], preset=4)       # doctest: +SKIP
+>>> reduction.rig.free                                         # doctest: +SKIP
+>>> usdhand.write_rig(reduction, "ok_rig.usdc")                # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+# Name -> module; each is imported when it is first used, since methods and USD take their time.
+_HOME = {
+    "Comparison": "usdhand.evaluate.compare",
+    "Finding": "usdhand.formats.usd.findings",
+    "apply_rig": "usdhand.reduce",
+    "build_library": "usdhand.verbs.fill",
+    "check_file": "usdhand.formats.usd.check",
+    "compare": "usdhand.verbs.clips",
+    "Edits": "usdhand.verbs.convert",
+    "Reading": "usdhand.formats.files",
+    "animation_names": "usdhand.formats.files",
+    "convert": "usdhand.verbs.convert",
+    "conventions_from": "usdhand.verbs.clips",
+    "expand": "usdhand.verbs.reduce",
+    "expand_onto": "usdhand.verbs.reduce",
+    "fill_fingers": "usdhand.verbs.fill",
+    "find_hands": "usdhand.verbs.clips",
+    "read_character": "usdhand.formats.files",
+    "read_clip": "usdhand.formats.files",
+    "read_library": "usdhand.verbs.fill",
+    "read_rig": "usdhand.verbs.reduce",
+    "reduce_hands": "usdhand.verbs.reduce",
+    "Pin": "usdhand.splice",
+    "SpliceSettings": "usdhand.splice",
+    "parse_pin": "usdhand.verbs.splice",
+    "retarget_hands": "usdhand.verbs.convert",
+    "PreviewSettings": "usdhand.verbs.preview",
+    "preview_clips": "usdhand.verbs.preview",
+    "write_preview": "usdhand.verbs.preview",
+    "reduction_target": "usdhand.verbs.reduce",
+    "splice_hands": "usdhand.verbs.splice",
+    "write_clip": "usdhand.verbs.clips",
+    "write_filled": "usdhand.verbs.fill",
+    "write_library": "usdhand.verbs.fill",
+    "write_new": "usdhand.verbs.convert",
+    "write_rig": "usdhand.verbs.reduce",
+    "write_spliced": "usdhand.verbs.splice",
+}
+
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'usdhand.verbs' has no attribute '{name}'")

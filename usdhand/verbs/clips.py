@@ -1,0 +1,83 @@
+"""Reading, writing and comparing clips, and finding their hands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from usdhand.anatomy import SIDES, Hands, Side
+from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.evaluate.compare import Comparison, compare_clips
+from usdhand.formats.files import reopened
+from usdhand.formats.usd.write import write_motion
+from usdhand.motion import Clip, Problem
+from usdhand.rigs import Conventions, load_conventions, map_character
+
+
+def find_hands(
+    clip: Clip,
+    conventions: Conventions | None = None,
+    sides: Sequence[Side] = SIDES,
+    others: Sequence[Clip] = (),
+) -> Hands:
+    """Find the hands of a clip's skeleton and build their anatomical frames.
+
+    ``others`` are more clips of the same skeleton: what geometry cannot decide is decided by the
+    motion of all of them.
+
+    Raises
+    ------
+    HandNotFoundError
+        if there is no hand, or an ambiguous one, or none on the wanted side.
+    """
+    name = clip.origin.path or clip.name
+    if unknown := set(sides) - set(SIDES):
+        raise UsageError(f"There is no side '{min(unknown)}'; sides are {' and '.join(SIDES)}.")
+    try:
+        character = map_character(clip.skeleton, conventions)
+        wanted = [side for side in sides if side in character.hands]
+        if not wanted:
+            there = " and ".join(character.hands)
+            raise HandNotFoundError(f"no {' or '.join(sides)} hand, only the {there} one")
+        return Hands.of(clip, character, wanted, others)
+    except HandNotFoundError as error:
+        raise HandNotFoundError(f"{name}: {error}") from error
+
+
+def conventions_from(files: Sequence[Path]) -> Conventions | None:
+    """Return the built-in conventions with a user's files on top, None without any."""
+    return load_conventions(*files) if files else None
+
+
+def write_clip(
+    clip: Clip,
+    output: str | Path,
+    *,
+    flatten: bool = False,
+    force: bool = False,
+    conventions: Conventions | None = None,
+    inputs: Sequence[Path] = (),
+) -> tuple[Problem, ...]:
+    """Write a clip's hands as a layer over the file it was read from; the body stays as it is.
+
+    Returns what one file, if it was to be one, could not keep.
+
+    Raises
+    ------
+    InputError
+        if the clip was not read from a file.
+    OutputError
+        if the output is refused or cannot be written.
+    """
+    character = reopened(clip)
+    changed = [j for f in find_hands(clip, conventions).frames.values() for j in f.links.moving]
+    return write_motion(
+        character, clip, changed, Path(output), flatten=flatten, force=force, inputs=inputs
+    )
+
+
+def compare(
+    a: Clip, b: Clip, *, align: bool = False, conventions: Conventions | None = None
+) -> Comparison:
+    """Compare motion B with motion A; see `usdhand.evaluate.compare.compare_clips`."""
+    return compare_clips(a, b, find_hands(a, conventions), find_hands(b, conventions), align)

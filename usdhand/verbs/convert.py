@@ -1,0 +1,272 @@
+"""Clips from one format to another, edited on the way; fingers from one character to another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from usdhand.anatomy import SIDES
+from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.formats.files import (
+    DEFAULT,
+    Reading,
+    animation_names,
+    is_usd,
+    read_any,
+    read_character,
+    write_other,
+)
+from usdhand.formats.output import check_output, written_beside
+from usdhand.formats.suffixes import USD_SUFFIXES, WRITABLE
+from usdhand.formats.usd.character import character_of, legal_clip
+from usdhand.formats.usd.convert import Placement, placed, write_placed
+from usdhand.formats.usd.stage import find_character
+from usdhand.formats.usd.write import save_layer
+from usdhand.motion import Clip, Problem, resample
+from usdhand.motion.editing import counted_in_frames, in_place, scaled, starting_at, trim
+from usdhand.motion.resample import in_time_of
+from usdhand.rigs import Conventions, map_character
+from usdhand.verbs.clips import find_hands
+
+RootMotion = Literal["keep", "drop"]
+MOST_FRAMES = 10_000_000
+
+
+@dataclass(frozen=True)
+class Edits:
+    """What is done to a clip between reading and writing.
+
+    Attributes
+    ----------
+    fps : frames a second to resample to
+    start : time code of the first frame in the output
+    trim : first and last time code to keep, in the input's time codes
+    scale : factor on the character's size
+    root_motion : "drop" keeps the hips over the spot where they start
+    up : "Y" or "Z", the up axis of the output (USD and BVH)
+    """
+
+    fps: float | None = None
+    start: float | None = None
+    trim: tuple[float | None, float | None] = (None, None)
+    scale: float = 1.0
+    root_motion: RootMotion = "keep"
+    up: str | None = None
+
+    @property
+    def of_frames(self) -> bool:
+        """Whether the motion itself is another one afterwards."""
+        return self.fps is not None or self.trim != (None, None) or self.root_motion == "drop"
+
+
+@dataclass(frozen=True, eq=False)
+class Converted:
+    """What was written.
+
+    Attributes
+    ----------
+    clip : the motion that the output shows
+    source : the clip as it was read
+    animated : whether there is motion, or a bind pose only
+    lost : what the output's format could not keep, and motion or hands that --onto left out
+    """
+
+    clip: Clip
+    source: Clip
+    animated: bool
+    lost: tuple[Problem, ...]
+
+
+def convert(
+    path: str | Path,
+    output: str | Path,
+    edits: Edits | None = None,
+    reading: Reading = DEFAULT,
+    *,
+    onto: str | Path | None = None,
+    onto_reading: Reading = DEFAULT,
+    conventions: Conventions | None = None,
+    force: bool = False,
+    dry_run: bool = False,
+) -> Converted:
+    """Read a file of any format and write it as ``output``, of the format of its suffix.
+
+    Parameters
+    ----------
+    onto : a character that gets the fingers of ``path``, and is written instead of it
+
+    Raises
+    ------
+    OutputError
+        if the output is refused or cannot be written; nothing is left behind then.
+    """
+    edits, output = edits or Edits(), Path(output)
+    inputs = [Path(path), *([Path(onto)] if onto else [])]
+    check_output(output, inputs, force, WRITABLE)
+    if edits.up == "Z" and output.suffix.lower() in (".glb", ".gltf"):
+        raise UsageError(f"{output}: glTF is always Y up, so --up Z cannot be had.")
+    lost: tuple[Problem, ...] = ()
+    source, animated = read_any(path, reading=reading)
+    if onto is None:
+        body, body_file, body_reading, fingers = source, Path(path), reading, None
+    else:
+        body, unread = _character(Path(onto), onto_reading)
+        body_file, body_reading, fingers, animated = Path(onto), onto_reading, source, True
+        lost = (*unread, *_left_out(source, body, conventions))
+    usd_to_usd = is_usd(body_file) and output.suffix.lower() in USD_SUFFIXES
+
+    def motion(clip: Clip) -> Clip:
+        if fingers is not None:
+            clip = retarget_hands(fingers, clip, conventions)
+        return edit_frames(clip, edits, conventions)
+
+    if usd_to_usd:
+        moved = motion(body)
+        placement = _placement(moved, edits, retimed=fingers is not None)
+        clip, edited = _on_stage(moved, placement), edits.of_frames or fingers is not None
+        if not dry_run:
+            character = placed(find_character(body_file, body_reading.skel), placement)
+            lost += write_placed(character, clip, output, edited=edited, force=force, inputs=inputs)
+    else:
+        clip = scaled(counted_in_frames(motion(body)), edits.scale)
+        if edits.start is not None:
+            clip = starting_at(clip, edits.start)
+        if not dry_run:
+            up = edits.up or "Y"
+            lost += write_new(clip, output, up=up, animated=animated, force=force)
+    return Converted(clip, source, animated, lost)
+
+
+def edit_frames(clip: Clip, edits: Edits, conventions: Conventions | None = None) -> Clip:
+    """Trim, resample and keep in place, as far as the edits ask for it.
+
+    Raises
+    ------
+    UsageError
+        if a rate, time code or scale cannot be meant.
+    """
+    clip = trim(clip, *edits.trim)
+    if edits.fps is not None:
+        if edits.fps > 0 and clip.duration * edits.fps > MOST_FRAMES:
+            raise UsageError(f"{edits.fps:g} frames a second would make over {MOST_FRAMES} frames.")
+        clip = resample(clip, edits.fps)
+    if edits.root_motion == "drop":
+        clip = in_place(clip, _hips(clip, conventions))
+    return clip
+
+
+def write_new(
+    clip: Clip,
+    output: Path,
+    *,
+    up: str = "Y",
+    animated: bool = True,
+    force: bool = False,
+) -> tuple[Problem, ...]:
+    """Write a clip as a file of its own, and return what its format could not keep.
+
+    Raises
+    ------
+    OutputError
+        if the output is refused or cannot be written; nothing is left behind then.
+    """
+    suffix = output.suffix.lower()
+    check_output(output, [p for p in [clip.origin.path] if p], force, WRITABLE)
+    if suffix in USD_SUFFIXES:
+        stage = character_of(legal_clip(clip), up=up, animated=animated).stage
+        save_layer(stage.GetRootLayer(), output, flatten=False)
+        return ()
+    with written_beside(output) as temporary:
+        return write_other(clip, temporary, suffix, up)
+
+
+def retarget_hands(hands: Clip, target: Clip, conventions: Conventions | None = None) -> Clip:
+    """Put the finger motion of one clip on another character, in the time of the hands.
+
+    Channels that both hands have are taken by their anatomical angles; the others, and the body,
+    stay the target's, whose motion is held at its ends where the hands go on longer.
+
+    Raises
+    ------
+    HandNotFoundError
+        if the two have no hand in common.
+    """
+    theirs = find_hands(hands, conventions)
+    body = in_time_of(target, hands)
+    own = find_hands(body, conventions)
+    sides = [side for side in own.frames if side in theirs.frames]
+    if not sides:
+        raise HandNotFoundError(
+            f"{hands.name} and {target.name} have no hand in common: the one has the "
+            f"{' and '.join(theirs.frames)}, the other the {' and '.join(own.frames)} one."
+        )
+    own = replace(own, frames={side: own.frames[side] for side in sides})
+    taken, kept = theirs.encode(hands), own.encode(body)
+    shared = [name for name in kept.names if name in set(taken.names)]
+    return own.decode(kept.replaced(taken.select(shared)), body)
+
+
+def _placement(clip: Clip, edits: Edits, retimed: bool) -> Placement:
+    """Return how a stage is placed anew so that ``clip`` starts where it shall."""
+    old = clip.origin.time_codes_per_second
+    new = edits.fps or (clip.fps if retimed else None)
+    offset = 0.0
+    if edits.start is not None:
+        offset = starting_at(clip, edits.start).origin.first_time_code - clip.start * (new or old)
+    return Placement(new, offset, edits.scale, edits.up)
+
+
+def _on_stage(clip: Clip, placement: Placement) -> Clip:
+    """Return a clip as its stage shows it with another placement."""
+    per_second = placement.per_second or clip.origin.time_codes_per_second
+    origin = replace(
+        clip.origin,
+        time_codes_per_second=per_second,
+        first_time_code=clip.start * per_second + placement.offset,
+        time_codes_per_frame=per_second / clip.fps,
+    )
+    return scaled(replace(clip, origin=origin), placement.scale)
+
+
+def _character(path: Path, reading: Reading) -> tuple[Clip, tuple[Problem, ...]]:
+    """Read a character that gets fingers; of several animations it takes none."""
+    names = animation_names(path)
+    if len(names) < 2 or reading.animation is not None:
+        return read_any(path, reading=reading)[0], ()
+    message = f"{path.name} has {len(names)} animations: its body stays at the bind pose"
+    return read_character(path, reading=reading), (Problem("several-animations", message),)
+
+
+def _left_out(hands: Clip, body: Clip, conventions: Conventions | None) -> tuple[Problem, ...]:
+    """Say what a character does not get, or loses, when it takes the fingers of a clip."""
+    found = []
+    theirs, own = (find_hands(clip, conventions).frames for clip in (hands, body))
+    for side in SIDES:
+        if (side in theirs) != (side in own):
+            without = body if side in theirs else hands
+            message = f"{without.name} has no {side} hand, so that one gets no fingers"
+            found.append(Problem("no-common-hand", message))
+    longer = body.duration - hands.duration
+    if len(body) > 1 and abs(longer) > 1.5 / hands.fps:
+        what = "is cut" if longer > 0 else "holds its last pose"
+        message = (
+            f"the result has the time of the hands: the body's motion {what} for the last "
+            f"{abs(longer):.2f} s"
+        )
+        found.append(Problem("other-length", message))
+    return tuple(found)
+
+
+def _hips(clip: Clip, conventions: Conventions | None) -> int:
+    """Return the joint that carries the body: the hips, or the first root where none is found."""
+    try:
+        found = map_character(clip.skeleton, conventions).hips
+    except HandNotFoundError:
+        found = None
+    return int(np.flatnonzero(clip.skeleton.parents < 0)[0]) if found is None else found
+
+
+__all__ = ["Converted", "Edits", "Reading", "convert", "edit_frames", "retarget_hands", "write_new"]

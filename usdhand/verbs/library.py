@@ -1,0 +1,304 @@
+"""Motion libraries built from files of any format."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+from usdhand.errors import InputError, UsageError, UsdHandError
+from usdhand.fill import LibraryClip, MotionLibrary, Segmentation, library_clip
+from usdhand.fill.library import Left
+from usdhand.formats.files import read_clip
+from usdhand.formats.hashing import file_hash
+from usdhand.formats.usd.library import is_library, read_library, relative_path, write_library
+from usdhand.rigs import load_conventions
+from usdhand.verbs.clips import find_hands
+
+
+@dataclass(frozen=True)
+class BuildResult:
+    """A built library and how many of its clips were read anew or taken over as they were.
+
+    ``unmatched`` are files that labels were given for and that are not among the clips;
+    ``removed`` are clips of the library before that are not among those given.
+    """
+
+    library: MotionLibrary
+    read: int
+    unchanged: int
+    unmatched: tuple[str, ...] = ()
+    removed: tuple[LibraryClip, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Task:
+    """One clip to read; goes to another process."""
+
+    path: Path
+    name: str
+    relative: str
+    content_hash: str
+    label: str
+    actor: str
+    segmentation: Segmentation
+    maps: tuple[Path, ...]
+
+
+def build_library(
+    paths: Sequence[Path],
+    output: Path,
+    *,
+    segmentation: Segmentation | None = None,
+    labels: Mapping[str, tuple[str, str]] | None = None,
+    previous: MotionLibrary | None = None,
+    rebuild: bool = False,
+    maps: Sequence[Path] = (),
+    jobs: int = 1,
+    progress: Callable[[Iterable[object], int], Iterable[object]] | None = None,
+    keep: float = 10.0,
+) -> BuildResult:
+    """Read clips into a library; a clip that cannot be used is left out with its reason.
+
+    Parameters
+    ----------
+    output : where the library will be written, for relative paths
+    labels : file -> (label, actor), the file with as many of its folders as tell it apart, with
+        or without its suffix; else labels come from file names
+    previous : clips whose content has not changed are taken over from it; labels that someone
+        edited, and actors, of the others too, as long as file or content is the same
+    rebuild : take over nothing but labels and actors
+    jobs : processes
+    keep : seconds after which what was read is kept beside the output, so that a build that was
+        interrupted goes on where it was
+    progress : wraps the iteration over finished clips; gets it and their number
+
+    Raises
+    ------
+    InputError
+        if no clip can be used.
+    """
+    cutting = segmentation or Segmentation()
+    kept = _kept_file(output)
+    known = _known([None if rebuild else previous, _read_kept(kept)])
+    tasks: list[_Task] = []
+    clips: list[LibraryClip] = []
+    left: list[Left] = []
+    used: set[str] = set()
+    contents = [file_hash(path) for path in paths]
+    before = _Before.of(previous, contents)
+    for path, name, content in zip(paths, _unique_names(paths), contents, strict=True):
+        relative = relative_path(path, output)
+        if content is None:
+            left.append(Left(relative, "no such file"))
+            continue
+        old, cut_as = known.get((content, relative)) or known.get((content, "")) or (None, cutting)
+        row = _row_of(path, labels or {})
+        used.add(row)
+        label, actor = _words(path, (labels or {}).get(row), before.find(content, relative) or old)
+        if old is None:
+            task = _Task(path, name, relative, content, label, actor, cutting, tuple(maps))
+            tasks.append(task)
+            continue
+        old = replace(old, name=name, path=relative, label=label, actor=actor)
+        clips.append(old if cut_as == cutting else _cut_again(old, cutting))
+    unchanged = len(clips)
+    results = _run(tasks, jobs)
+    next_time = time.monotonic() + keep
+    try:
+        for done in progress(results, len(tasks)) if progress else results:
+            (clips if isinstance(done, LibraryClip) else left).append(done)  # type: ignore[arg-type]
+            if time.monotonic() > next_time:
+                # A tenth of the time at most: the larger the library, the rarer.
+                next_time += max(keep, 10.0 * _keep(clips[unchanged:], cutting, kept))
+    except BaseException:
+        _keep(clips[unchanged:], cutting, kept)
+        raise
+    if not clips:
+        reasons = "; ".join(f"{entry.path}: {entry.reason}" for entry in left[:3])
+        raise InputError(f"No clip can be used for a library. {reasons}")
+    ordered = tuple(sorted(clips, key=lambda c: c.name))
+    library = MotionLibrary(ordered, cutting, tuple(sorted(left, key=lambda entry: entry.path)))
+    unmatched = tuple(file for file in labels or {} if file not in used)
+    here = {*contents, *(relative_path(path, output) for path in paths)}
+    removed = tuple(
+        clip
+        for clip in (previous.clips if previous else ())
+        if clip.content_hash not in here and clip.path not in here
+    )
+    return BuildResult(library, len(ordered) - unchanged, unchanged, unmatched, removed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Before:
+    """Clips of the library that is built again: by content and file, content, or file alone.
+
+    By file alone only where the content is nowhere else: there someone edited the file; else it
+    was given another name.
+    """
+
+    clips: Mapping[tuple[str, str], LibraryClip]
+
+    @classmethod
+    def of(cls, library: MotionLibrary | None, contents: Iterable[str | None]) -> _Before:
+        found: dict[tuple[str, str], LibraryClip] = {}
+        here = set(contents)
+        for clip in library.clips if library else ():
+            found.setdefault((clip.content_hash, clip.path), clip)
+            found.setdefault((clip.content_hash, ""), clip)
+            if clip.content_hash not in here:
+                found.setdefault(("", clip.path), clip)
+        return cls(found)
+
+    def find(self, content: str, path: str) -> LibraryClip | None:
+        """The clip with this content, or of this file."""
+        keys = ((content, path), (content, ""), ("", path))
+        return next((self.clips[key] for key in keys if key in self.clips), None)
+
+
+def forget_interrupted(output: Path) -> None:
+    """Remove what an interrupted build of this library kept; it is in the library now."""
+    _kept_file(output).unlink(missing_ok=True)
+
+
+def interrupted_clips(output: Path) -> int:
+    """How many clips an interrupted build of this library has kept for the next one."""
+    kept = _read_kept(_kept_file(output))
+    return len(kept.clips) if kept else 0
+
+
+def gone_clips(library: MotionLibrary, folder: Path) -> list[str]:
+    """Paths of clips whose file is not there; filling needs none of them, `measure_library` all."""
+    return [clip.path for clip in library.clips if not (folder / clip.path).is_file()]
+
+
+def _kept_file(output: Path) -> Path:
+    return output.with_name(f".{output.stem}.interrupted.usdc")
+
+
+def _keep(clips: Sequence[LibraryClip], segmentation: Segmentation, path: Path) -> float:
+    """Write what was read so far; seconds that it took."""
+    start = time.monotonic()
+    if clips:
+        write_library(MotionLibrary(tuple(clips), segmentation), path, force=True)
+    return time.monotonic() - start
+
+
+def _read_kept(path: Path) -> MotionLibrary | None:
+    try:
+        return read_library(path) if path.exists() else None
+    except InputError:
+        return None
+
+
+def _known(
+    libraries: Iterable[MotionLibrary | None],
+) -> dict[tuple[str, str], tuple[LibraryClip, Segmentation]]:
+    """Clips by content and path, and by content alone, with how they were cut."""
+    known: dict[tuple[str, str], tuple[LibraryClip, Segmentation]] = {}
+    for library in libraries:
+        for clip in library.clips if library else ():
+            for key in ((clip.content_hash, clip.path), (clip.content_hash, "")):
+                known.setdefault(key, (clip, library.segmentation))  # type: ignore[union-attr]
+    return known
+
+
+def _row_of(path: Path, labels: Mapping[str, tuple[str, str]]) -> str:
+    """Under which name a file stands among labels, with or without folders and suffix; else ""."""
+    for whole in (path.absolute(), path.absolute().with_suffix("")):
+        for start in range(len(whole.parts)):
+            name = "/".join(whole.parts[start:])
+            if labels.get(name):
+                return name
+    return ""
+
+
+def _words(path: Path, given: tuple[str, str] | None, old: LibraryClip | None) -> tuple[str, str]:
+    """Label and actor: from a table, else as someone edited them, else by the name."""
+    actor = old.actor if old else ""
+    if given:
+        return given[0], given[1] or actor
+    edited = old is not None and is_edited(old)
+    return (old.label if old and edited else label_of(path.stem)), actor
+
+
+def is_edited(clip: LibraryClip) -> bool:
+    """Whether a clip's label is not the one of its file's name."""
+    return clip.label != label_of(PurePosixPath(clip.path).stem)
+
+
+def label_of(stem: str) -> str:
+    """Label in a file name: what stands before a running number, ``doubt_shrug_03``; else none."""
+    found = re.fullmatch(r"(.*?[A-Za-z])[ _.-]*\d+", stem)
+    return found.group(1) if found else ""
+
+
+def _run(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Left]:
+    if jobs <= 1 or len(tasks) < 2:
+        return map(_read, tasks)
+    return _in_processes(tasks, jobs)
+
+
+def _in_processes(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Left]:
+    # Not forked: USD has threads, and a copy of a process with threads may hang.
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"))
+    try:
+        yield from pool.map(_read, tasks, chunksize=max(1, min(16, len(tasks) // (8 * jobs))))
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _read(task: _Task) -> LibraryClip | Left:
+    try:
+        clip = read_clip(task.path)
+        if len(clip) < 2:
+            return Left(task.relative, "it is a single frame")
+        conventions = load_conventions(*task.maps) if task.maps else None
+        made = library_clip(
+            clip,
+            find_hands(clip, conventions),
+            task.segmentation,
+            path=task.relative,
+            content_hash=task.content_hash,
+            label=task.label,
+            actor=task.actor,
+        )
+        if not made.hands:
+            return Left(task.relative, "its fingers do not move")
+        return replace(made, name=task.name)
+    except UsdHandError as error:
+        # The reason stands beside the path, which need not be in it again.
+        reason = str(error).removeprefix(f"{task.path}: ")
+        return Left(task.relative, "it is a motion library" if is_library(task.path) else reason)
+
+
+def _cut_again(clip: LibraryClip, segmentation: Segmentation) -> LibraryClip:
+    """Return a clip with other segments; its motion need not be read again."""
+    from usdhand.fill.candidates import part_segments
+
+    hands = {
+        side: replace(hand, segments=tuple(part_segments([hand.arm], segmentation)))
+        for side, hand in clip.hands.items()
+    }
+    return replace(clip, hands=hands)
+
+
+def _unique_names(paths: Sequence[Path]) -> list[str]:
+    """File names without suffix; where they repeat, with the folder's name before."""
+    if len({path.absolute() for path in paths}) < len(paths):
+        raise UsageError("A clip is given twice.")
+    stems = [path.stem for path in paths]
+    names: list[str] = []
+    for path in paths:
+        repeated = stems.count(path.stem) > 1
+        wanted = f"{path.absolute().parent.name}_{path.stem}" if repeated else path.stem
+        name, number = wanted, 1
+        while name in names or (name != path.stem and name in stems):
+            number += 1
+            name = f"{wanted}_{number}"
+        names.append(name)
+    return names

@@ -1,0 +1,231 @@
+"""Clips and reports gathered into a page to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from usdhand.anatomy import Side
+from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.formats.files import is_usd, read_any
+from usdhand.formats.hashing import file_hash
+from usdhand.formats.output import check_output, written_beside
+from usdhand.formats.usd.takes import Take, read_takes
+from usdhand.motion import Clip
+from usdhand.motion.rotations import Array
+from usdhand.report.preview.events import (
+    lane_of,
+    read_report,
+    report_rows,
+    report_verb,
+    retiming,
+    warp_rows,
+)
+from usdhand.report.preview.lanes import Lane, lane_data, unshown
+from usdhand.report.preview.pack import Pack
+from usdhand.report.preview.page import figure, page
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import find_hands
+
+__all__ = ["PreviewSettings", "Previewed", "preview_clips", "write_preview"]
+
+PAGE_SUFFIXES = (".html", ".htm")
+MOST_SHOWN = 6  # lanes, when the page opens
+
+
+@dataclass(frozen=True)
+class PreviewSettings:
+    """What goes into a page.
+
+    Attributes
+    ----------
+    max_frames : longer clips keep every second, third, ... frame, so that they have no more
+    max_points : characters with larger meshes are shown as bones; 0 for no meshes at all
+    """
+
+    max_frames: int = 10_800
+    max_points: int = 40_000
+
+    def __post_init__(self) -> None:
+        if self.max_frames < 2:
+            raise UsageError(f"A page of {self.max_frames} frames shows no motion: give 2 or more.")
+
+
+@dataclass(frozen=True, eq=False)
+class Previewed:
+    """A page, the clips it was made of, and what a person should know about it."""
+
+    html: str
+    clips: tuple[Clip, ...]
+    lanes: tuple[dict[str, Any], ...]
+    notes: tuple[str, ...]
+
+
+def preview_clips(
+    files: Sequence[str | Path],
+    settings: PreviewSettings | None = None,
+    *,
+    skel: str | None = None,
+    reports: Sequence[str | Path] = (),
+    figures: Sequence[str | Path] = (),
+    title: str | None = None,
+    conventions: Conventions | None = None,
+) -> Previewed:
+    """Make a page of clips: side by side or over each other, in sync from their first frames.
+
+    Parameters
+    ----------
+    reports : JSON reports of `fill` or `splice`, for the timeline, of files that are shown; with
+        that of a splice, its hand clip plays in the time of the body
+    figures : SVG or PNG files to show below
+
+    Raises
+    ------
+    InputError
+        if a file cannot be used.
+    UsageError
+        if a report tells of none of the files.
+    """
+    if not files:
+        raise UsageError("There is nothing to show: give a file.")
+    settings = settings or PreviewSettings()
+    read = [(Path(path), read_report(Path(path))) for path in reports]
+    pictures = [figure(Path(path)) for path in figures]
+    names = _names([Path(f) for f in files])
+    lanes = [
+        lane
+        for path, name in names.items()
+        for lane in _lanes(path, name, skel, settings, conventions)
+    ]
+    rows = [row for path, report in read for row in _report_rows(report, path, lanes)]
+    lanes = _retimed(lanes, dict(retiming(report) for _, report in read))
+    if not any(report_verb(report) == "splice" for _, report in read):
+        rows += [row for lane in lanes if lane.shown for row in _warp_rows(lane)]
+    lanes, hidden = _few_shown(lanes)
+    pack = Pack()
+    made = [lane_data(lane, pack, settings.max_frames) for lane in lanes]
+    notes = tuple(f"{d['name']}: {note}" for d in made for note in d["notes"])
+    data = {"lanes": made, "rows": rows, "notes": hidden, **pack.document()}
+    text = page(title or _title(list(names.values())), data, pictures)
+    return Previewed(text, tuple(lane.clip for lane in lanes), tuple(made), (*notes, *hidden))
+
+
+def write_preview(
+    previewed: Previewed, output: str | Path, *, force: bool = False, inputs: Sequence[Path] = ()
+) -> None:
+    """Write a page.
+
+    Raises
+    ------
+    OutputError
+        if the output is refused or cannot be written.
+    """
+    output = Path(output)
+    check_output(output, inputs, force, PAGE_SUFFIXES)
+    with written_beside(output) as temporary:
+        temporary.write_text(previewed.html, encoding="utf-8")
+
+
+def _lanes(
+    path: Path,
+    name: str,
+    skel: str | None,
+    settings: PreviewSettings,
+    conventions: Conventions | None,
+) -> list[Lane]:
+    if is_usd(path):
+        takes = read_takes(path, skel, skins=settings.max_points > 0)
+    else:
+        takes = [Take(read_any(path, skel)[0])]
+    return [_lane(take, path, name, i == 0, settings, conventions) for i, take in enumerate(takes)]
+
+
+def _lane(
+    take: Take,
+    path: Path,
+    name: str,
+    first: bool,
+    settings: PreviewSettings,
+    conventions: Conventions | None,
+) -> Lane:
+    notes = [*take.notes, *(str(p) for p in take.clip.problems if p.severity == "warning")]
+    try:
+        hands = find_hands(take.clip, conventions)
+        notes += hands.notes
+    except HandNotFoundError as error:
+        hands = None
+        notes.append(f"no close-ups and curves: {str(error).removeprefix(f'{path}: ')}")
+    skins = take.skins
+    if word := unshown(skins, settings.max_points):
+        skins = ()
+        notes.append(word)
+    return Lane(
+        name=f"{name} {take.alternative}".rstrip(),
+        clip=take.clip,
+        hands=hands,
+        alternative=take.alternative,
+        shown=first,
+        skins=skins,
+        relations=take.rig.relations if take.rig else (),
+        warps=take.warps,
+        notes=tuple(notes) if first else (),
+    )
+
+
+def _report_rows(
+    report: Mapping[str, Any], path: Path, lanes: Sequence[Lane]
+) -> list[dict[str, Any]]:
+    rows = report_rows(report, path)
+    lane = lane_of(report, path, lanes, _hashes(lanes))
+    return [{**row, "source": path.name, "lane": lane.name} for row in rows]
+
+
+def _hashes(lanes: Sequence[Lane]) -> list[str]:
+    return [file_hash(lane.clip.origin.path or Path()) or "" for lane in lanes]
+
+
+def _retimed(lanes: Sequence[Lane], warps: Mapping[str, Mapping[Side, Array]]) -> list[Lane]:
+    """Lanes of the hand clips that were spliced play in the time of the body."""
+    if not any(warps):
+        return list(lanes)
+    return [
+        replace(lane, retime=warps.get(h, {}))
+        for lane, h in zip(lanes, _hashes(lanes), strict=True)
+    ]
+
+
+def _warp_rows(lane: Lane) -> list[dict[str, Any]]:
+    return [
+        {**row, "source": "", "lane": lane.name} for row in warp_rows(lane.warps, lane.clip.fps)
+    ]
+
+
+def _few_shown(lanes: Sequence[Lane]) -> tuple[list[Lane], list[str]]:
+    shown = [i for i, lane in enumerate(lanes) if lane.shown]
+    if len(shown) <= MOST_SHOWN:
+        return list(lanes), []
+    first = shown[:MOST_SHOWN]
+    word = f"the first {MOST_SHOWN} of {len(lanes)} lanes are shown; choose others on the page"
+    return [replace(lane, shown=i in first) for i, lane in enumerate(lanes)], [word]
+
+
+def _title(names: Sequence[str]) -> str:
+    if len(names) <= MOST_SHOWN:
+        return ", ".join(names)
+    return f"{', '.join(names[:2])} and {len(names) - 2} more"
+
+
+def _names(files: Sequence[Path]) -> dict[Path, str]:
+    """Names of lanes: the files' own, with as many folders as tell them apart."""
+
+    def name(file: Path) -> str:
+        parts = file.absolute().with_suffix("").parts
+        for count in range(1, len(parts)):
+            own = parts[-count:]
+            if sum(f.absolute().with_suffix("").parts[-count:] == own for f in files) == 1:
+                return "/".join(own)
+        return file.name
+
+    return {file: name(file) for file in files}
