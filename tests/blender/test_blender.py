@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.blender import Y_UP, blender_python, turned
 from conftest import REPOSITORY, shared_data
 
 from usdhand import verbs as api
@@ -19,7 +18,6 @@ from usdhand.motion import forward_kinematics
 from usdhand.motion import rotations as rot
 
 pytestmark = pytest.mark.blender
-Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # Blender is Z up
 TOLERANCE_DEG = 0.01
 
 
@@ -29,16 +27,6 @@ class Loaded:
     rest: np.ndarray
     posed: np.ndarray
     properties: dict[str, object]
-
-
-def blender_python() -> str:
-    """Python that has bpy: its own environment by preference, for bpy pins an old numpy."""
-    chosen = os.environ.get("USDHAND_BLENDER_PYTHON")
-    if chosen:
-        return chosen
-    if importlib.util.find_spec("bpy"):
-        return sys.executable
-    pytest.skip("no Blender: set USDHAND_BLENDER_PYTHON to a Python with bpy 5.0")
 
 
 def load(path: Path, folder: Path, frames: list[float]) -> Loaded:
@@ -55,11 +43,6 @@ def load(path: Path, folder: Path, frames: list[float]) -> Loaded:
     return Loaded(
         list(data["names"]), data["rest"], data["posed"], json.loads(str(data["properties"]))
     )
-
-
-def turned(matrices: np.ndarray) -> np.ndarray:
-    u, _, vt = np.linalg.svd(matrices[..., :3, :3])
-    return u @ vt
 
 
 def assert_same_motion(path: Path, folder: Path) -> Loaded:

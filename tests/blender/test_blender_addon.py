@@ -14,11 +14,11 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from builders.blender import blender_python, turned
 from builders.cli_runner import run
 from conftest import REPOSITORY, shared_data
 from numpy.typing import NDArray
 from pxr import Usd
-from test_blender import blender_python, turned
 
 from usdhand import verbs as api
 from usdhand.anatomy.angles import from_euler, from_swing_twist

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.blender import Y_UP, blender_python, turned
 from conftest import REPOSITORY, shared_data
-from test_blender import Y_UP, blender_python, turned
 
 from usdhand import verbs as api
 from usdhand.formats.bvh.read import read_clip

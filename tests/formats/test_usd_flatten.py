@@ -14,7 +14,7 @@ from conftest import REPOSITORY
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel
 
 from usdhand.formats.usd.check import check_file
-from usdhand.formats.usd.convert import Placement, motion_variants, placed, write_placed
+from usdhand.formats.usd.convert import StageEdit, motion_variants, placed, write_placed
 from usdhand.formats.usd.flatten import flat_layer, variant_places
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.stage import find_character
@@ -242,7 +242,7 @@ def inheriting(folder: Path) -> Path:
 def test_variants_that_cannot_be_kept_are_said(
     source: Callable[[Path], Path], reason: str, tmp_path: Path
 ) -> None:
-    character = placed(find_character(source(tmp_path)), Placement())
+    character = placed(find_character(source(tmp_path)), StageEdit())
     target = tmp_path / "out.usda"
     [lost] = write_placed(character, clip_from_character(character), target, edited=False)
     assert lost.code == "variants"
@@ -304,7 +304,7 @@ def bound_by_variant(folder: Path) -> Path:
 def test_edited_motion_is_the_selected_variants_and_that_is_said(
     source: Callable[[Path], Path], tmp_path: Path
 ) -> None:
-    character = placed(find_character(source(tmp_path)), Placement())
+    character = placed(find_character(source(tmp_path)), StageEdit())
     [(path, name, selection)] = motion_variants(character)
     assert (name, selection) == ("take", "two")
     clip = clip_from_character(character)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.blender import blender_python
 from conftest import REPOSITORY, SHARED, shared_data
-from test_blender import blender_python
 
 from usdhand.formats.fbx import read
 from usdhand.formats.usd import read as usd

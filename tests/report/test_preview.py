@@ -26,9 +26,9 @@ from pxr import Usd, UsdGeom, UsdSkel
 
 from usdhand import verbs as api
 from usdhand.errors import InputError
+from usdhand.formats.usd.shown import read_shown
 from usdhand.formats.usd.skins import read_skins
 from usdhand.formats.usd.stage import find_character
-from usdhand.formats.usd.takes import read_takes
 from usdhand.formats.usd.world import world_above
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
@@ -146,7 +146,7 @@ def test_a_mesh_whose_faces_do_not_fit_is_left_out_with_a_word(tmp_path: Path) -
         mesh.GetFaceVertexCountsAttr().Set([3, 3])
 
     path = edit(OK, tmp_path / "broken.usdc", break_hands)
-    [take] = read_takes(path)
+    [take] = read_shown(path)
     assert "Hands" not in [skin.name for skin in take.skins]
     assert len(take.skins) == 6
     assert "Hands" in take.notes[0]
@@ -213,7 +213,7 @@ def test_characters_without_motion_or_hands_are_shown_all_the_same(tmp_path: Pat
     run("preview", SAMPLES / "characters" / "ben.usdc", "-o", tmp_path / "still.html")
     [lane] = page_data(tmp_path / "still.html")["lanes"]
     assert lane["frames"] == 1
-    takes = read_takes(SAMPLES / "characters" / "ada_hand_right.usdc")
+    takes = read_shown(SAMPLES / "characters" / "ada_hand_right.usdc")
     assert len(takes[0].clip) == 1
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from usdhand.anatomy import SIDES
 from usdhand.anatomy.channels import model_channels
 from usdhand.fill.candidates import Candidate
-from usdhand.fill.path import Path, alternative_paths, transition_cost
+from usdhand.fill.path import SegmentPath, alternative_paths, transition_cost
 from usdhand.fill.settings import FillSettings
 from usdhand.motion.rotations import Array
 
@@ -80,7 +80,7 @@ def _same_segment(
     return same
 
 
-def choose(graph: Graph, settings: FillSettings) -> list[Path]:
+def choose(graph: Graph, settings: FillSettings) -> list[SegmentPath]:
     """The cheapest path and its alternatives, cheapest first."""
     nodes = [layer.costs for layer in graph.layers]
     node, edge = settings.segment_weight, settings.transition_weight

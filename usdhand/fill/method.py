@@ -27,7 +27,7 @@ from usdhand.fill.choose import Graph, choose, graph
 from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate, fingers_moving
 from usdhand.fill.limits import channel_limits
 from usdhand.fill.metric import metric
-from usdhand.fill.path import Path
+from usdhand.fill.path import SegmentPath
 from usdhand.fill.results import Alternative, Choice, Filled, FilledPart
 from usdhand.fill.same import same_motion
 from usdhand.fill.segment import Segmentation
@@ -277,7 +277,7 @@ def _fill_part(
 
 
 def _choices(
-    path: Path,
+    path: SegmentPath,
     network: Graph,
     found: Sequence[Sequence[Candidate]],
     cut: Sequence[tuple[int, int]],

@@ -20,7 +20,7 @@ STRENGTHS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1e4)
 
 
 @dataclass(frozen=True)
-class Path:
+class SegmentPath:
     """One candidate a layer, and what the choice costs."""
 
     nodes: tuple[int, ...]
@@ -48,7 +48,7 @@ def transition_cost(
     return np.asarray(squares.mean(axis=2))
 
 
-def best_path(nodes: Sequence[Array], edges: Sequence[Array]) -> Path:
+def best_path(nodes: Sequence[Array], edges: Sequence[Array]) -> SegmentPath:
     """The cheapest path; ties fall to the lower node, earlier layers first.
 
     Parameters
@@ -57,15 +57,17 @@ def best_path(nodes: Sequence[Array], edges: Sequence[Array]) -> Path:
     edges : between layers l and l + 1, (n_l, n_l+1) cost of each edge
     """
     if not nodes:
-        return Path((), 0.0)
+        return SegmentPath((), 0.0)
     to_go = _costs_to_go(nodes, edges)
     chosen = [int(np.argmin(to_go[0]))]
     for edge, rest in zip(edges, to_go[1:], strict=True):
         chosen.append(int(np.argmin(edge[chosen[-1]] + rest)))
-    return Path(tuple(chosen), path_cost(chosen, nodes, edges))
+    return SegmentPath(tuple(chosen), path_cost(chosen, nodes, edges))
 
 
-def alternative_paths(nodes: Sequence[Array], edges: Sequence[Array], count: int) -> list[Path]:
+def alternative_paths(
+    nodes: Sequence[Array], edges: Sequence[Array], count: int
+) -> list[SegmentPath]:
     """The best path and others that really differ, cheapest first.
 
     The next cheapest paths of a long graph differ in a single node, which nobody would see. So a
@@ -85,7 +87,7 @@ def alternative_paths(nodes: Sequence[Array], edges: Sequence[Array], count: int
             dearer = [n + strength * typical * p for n, p in zip(nodes, penalty, strict=True)]
             path = best_path(dearer, edges)
             if all(_difference(path, other) >= DISTINCT_SHARE for other in found):
-                found.append(Path(path.nodes, path_cost(path.nodes, nodes, edges)))
+                found.append(SegmentPath(path.nodes, path_cost(path.nodes, nodes, edges)))
                 break
         else:
             break
@@ -99,7 +101,7 @@ def path_cost(choice: Sequence[int], nodes: Sequence[Array], edges: Sequence[Arr
     return cost + sum(float(e[i, j]) for e, i, j in steps)
 
 
-def _difference(a: Path, b: Path) -> float:
+def _difference(a: SegmentPath, b: SegmentPath) -> float:
     """Share of layers in which two paths differ."""
     return sum(i != j for i, j in zip(a.nodes, b.nodes, strict=True)) / max(len(a.nodes), 1)
 

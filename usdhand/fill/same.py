@@ -33,7 +33,7 @@ SHORT_EXCERPT_S = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class FeatureCurve:
     """A feature over time, (frames, n) in cm or degrees, with what comparing it takes again."""
 
     rows: Array
@@ -67,7 +67,7 @@ class Curve:
         return np.concatenate([[0.0], np.cumsum(squared)])
 
 
-Rows = Mapping[str, Curve]
+Rows = Mapping[str, FeatureCurve]
 
 
 def same_motion(
@@ -87,7 +87,7 @@ def same_motion(
 
 
 def _rows(arm: ArmMotion) -> Rows:
-    return {name: Curve(FEATURES[name](arm)) for name in ALIKE}
+    return {name: FeatureCurve(FEATURES[name](arm)) for name in ALIKE}
 
 
 def _same(pairs: list[tuple[Rows, ArmMotion]]) -> bool:
@@ -110,7 +110,7 @@ def _same(pairs: list[tuple[Rows, ArmMotion]]) -> bool:
 
 
 def _inside(
-    pairs: list[tuple[Curve, Curve]], tolerance: float, least: float
+    pairs: list[tuple[FeatureCurve, FeatureCurve]], tolerance: float, least: float
 ) -> tuple[NDArray[np.bool_], bool]:
     """At which offsets of the shorter rows in the longer ones all are alike, and if any moves."""
     ordered = [(a, b) if len(a) <= len(b) else (b, a) for a, b in pairs]
@@ -119,7 +119,7 @@ def _inside(
     return np.asarray(apart < tolerance), bool(moves)
 
 
-def _apart(short: Curve, long: Curve) -> Array:
+def _apart(short: FeatureCurve, long: FeatureCurve) -> Array:
     """Root mean square between rows (m, n) and each m rows of (frames, n): (frames - m + 1,)."""
     from scipy import fft
 
@@ -132,7 +132,7 @@ def _apart(short: Curve, long: Curve) -> Array:
     return np.asarray(np.sqrt(np.maximum(total, 0.0) / rows.size))
 
 
-def _alike(pairs: list[tuple[Curve, Curve]], tolerance: float, least: float) -> bool:
+def _alike(pairs: list[tuple[FeatureCurve, FeatureCurve]], tolerance: float, least: float) -> bool:
     """Whether all pairs of rows (frames, n) are alike at one offset, and some of them moves."""
     if max(np.ptp(a.rows, axis=0).max() for a, _ in pairs) < least:
         return False

@@ -12,7 +12,7 @@ from usdhand.motion.skeleton import Skeleton, leaf_name
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.rigs.body import arm_joints, body_of
 from usdhand.rigs.conventions import Convention, name_key
-from usdhand.rigs.naming import Rig
+from usdhand.rigs.naming import NamedJoints
 
 # A wrist with more joints below it, thumb aside, has fingers, whatever they are called. A mitten
 # has up to three: a hand, all fingers in one, an end.
@@ -34,7 +34,7 @@ class BareArms:
 
 
 @dataclass(frozen=True)
-class _Match:
+class _ArmMatch:
     """A convention's arms in a rig: side -> role -> joint."""
 
     convention: Convention
@@ -49,7 +49,7 @@ def bare_arms(skeleton: Skeleton, conventions: Conventions | None = None) -> Bar
     Wrists that a map file names win over known conventions.
     """
     conventions = conventions or load_conventions()
-    rig = Rig(skeleton)
+    rig = NamedJoints(skeleton)
     found = max(_matches(rig, conventions.conventions), key=lambda m: m.rank, default=None)
     arms: dict[Side, dict[str, int]] = {}
     for side in SIDES:
@@ -104,12 +104,12 @@ def finger_names(
     raise AssertionError("no convention has free names")  # they are some thirty, all different
 
 
-def _is_bare(rig: Rig, wrist: int) -> bool:
+def _is_bare(rig: NamedJoints, wrist: int) -> bool:
     below = [j for j in range(len(rig.names)) if wrist in rig.above[j]]
     return sum("thumb" not in rig.path(j).lower() for j in below) <= MOST_WITHOUT_FINGERS
 
 
-def _matches(rig: Rig, conventions: Sequence[Convention]) -> Iterator[_Match]:
+def _matches(rig: NamedJoints, conventions: Sequence[Convention]) -> Iterator[_ArmMatch]:
     for number, convention in enumerate(conventions):
         keys = convention.hand_keys
         wrists = {n for side in SIDES for n in keys.get(side, {}).get("wrist", ())}
@@ -140,7 +140,7 @@ def _matches(rig: Rig, conventions: Sequence[Convention]) -> Iterator[_Match]:
             body = {r: j[0] for r in BODY_JOINTS if (j := joint(convention.body_keys.get(r, ())))}
             matched = sum(map(len, arms.values())) + len(body)
             rank = (matched, -len(prefix) - len(suffix), -number)
-            yield _Match(convention, arms, body, rank)
+            yield _ArmMatch(convention, arms, body, rank)
 
 
 def _affixes(leaf: str, wrists: Sequence[str]) -> tuple[str, str]:

@@ -19,7 +19,7 @@ from usdhand.rigs.conventions import (
     load_conventions,
     named_side,
 )
-from usdhand.rigs.naming import ADVICE, Rig, is_hand, match_names, named_body
+from usdhand.rigs.naming import ADVICE, NamedJoints, is_hand, match_names, named_body
 
 
 def map_character(skeleton: Skeleton, conventions: Conventions | None = None) -> CharacterMap:
@@ -39,7 +39,7 @@ def map_character(skeleton: Skeleton, conventions: Conventions | None = None) ->
         There is no hand, or more than one joint could be the same joint of a hand.
     """
     conventions = load_conventions() if conventions is None else conventions
-    rig = Rig(skeleton)
+    rig = NamedJoints(skeleton)
     by_hand = conventions.explicit
     try:
         found = _found(rig, conventions)
@@ -51,9 +51,9 @@ def map_character(skeleton: Skeleton, conventions: Conventions | None = None) ->
     return _with_arms_and_body(rig, found)
 
 
-def _found(rig: Rig, conventions: Conventions) -> CharacterMap:
+def _found(rig: NamedJoints, conventions: Conventions) -> CharacterMap:
     """Hands and body as far as names tell, or hands by their shape."""
-    aliased = Rig(rig.skeleton, aliased=True) if any(rig.skeleton.aliases) else None
+    aliased = NamedJoints(rig.skeleton, aliased=True) if any(rig.skeleton.aliases) else None
     if aliased and (found := match_names(aliased, conventions)):
         return _with_unnamed_digits(rig, found)
     if found := match_names(rig, conventions):
@@ -63,7 +63,7 @@ def _found(rig: Rig, conventions: Conventions) -> CharacterMap:
     return named_body(aliased, found, conventions) if aliased else found
 
 
-def _with_unnamed_digits(rig: Rig, found: CharacterMap) -> CharacterMap:
+def _with_unnamed_digits(rig: NamedJoints, found: CharacterMap) -> CharacterMap:
     """Add digits of unknown names where the shape of the hand agrees with all names there are."""
     if all(hand.digits == DIGITS for hand in found.hands.values()):
         return found
@@ -87,7 +87,7 @@ def _with_unnamed_digits(rig: Rig, found: CharacterMap) -> CharacterMap:
 
 
 def _with_explicit(
-    rig: Rig, found: CharacterMap, tables: Mapping[str, Mapping[str, str]]
+    rig: NamedJoints, found: CharacterMap, tables: Mapping[str, Mapping[str, str]]
 ) -> CharacterMap:
     """Put the joints of ``[left]``, ``[right]`` and ``[body]`` over what was found."""
     hands = dict(found.hands)
@@ -104,7 +104,7 @@ def _with_explicit(
     return replace(found, hands=hands, notes=notes, **body)
 
 
-def _check_named(rig: Rig, hand: HandMap) -> None:
+def _check_named(rig: NamedJoints, hand: HandMap) -> None:
     """Refuse a digit whose joints stand in the wrong order: a map file has them mixed up."""
     for digit in hand.digits:
         chain = [name for name in HAND_JOINTS if name.startswith(digit) and name in hand.joints]
@@ -116,7 +116,7 @@ def _check_named(rig: Rig, hand: HandMap) -> None:
                 )
 
 
-def _check_apart(rig: Rig, hands: Mapping[Side, HandMap]) -> None:
+def _check_apart(rig: NamedJoints, hands: Mapping[Side, HandMap]) -> None:
     """Refuse a joint that is said to be in both hands."""
     of_side = [{h.wrist, *h.joints.values()} for h in hands.values()]
     shared = set.intersection(*of_side) if len(of_side) == len(SIDES) else set()
@@ -124,7 +124,7 @@ def _check_apart(rig: Rig, hands: Mapping[Side, HandMap]) -> None:
         raise HandNotFoundError(f"map file: '{rig.path(min(shared))}' is named for both hands")
 
 
-def _lookup(rig: Rig, table: str, role: str, name: str) -> int:
+def _lookup(rig: NamedJoints, table: str, role: str, name: str) -> int:
     joint = rig.skeleton.find(name)
     if joint is None:
         many = rig.skeleton.names.count(name)
@@ -152,7 +152,7 @@ def _amended(hand: HandMap | None, side: Side, named: Mapping[str, int]) -> Hand
     )
 
 
-def _with_arms_and_body(rig: Rig, found: CharacterMap) -> CharacterMap:
+def _with_arms_and_body(rig: NamedJoints, found: CharacterMap) -> CharacterMap:
     """Fill in arm and body joints that names did not give, by hierarchy."""
     wrists = [h.wrist for h in found.hands.values()]
     body = body_of(rig.skeleton, rig.points, wrists).joints
@@ -176,7 +176,7 @@ def _with_arms_and_body(rig: Rig, found: CharacterMap) -> CharacterMap:
 # --- geometry ------------------------------------------------------------------------------------
 
 
-def _by_geometry(rig: Rig, conventions: Conventions) -> CharacterMap:
+def _by_geometry(rig: NamedJoints, conventions: Conventions) -> CharacterMap:
     found: Sequence[geometry.FoundHand]
     found, reasons = geometry.find_hands(rig.skeleton, rig.points)
     if not found:
@@ -205,7 +205,7 @@ def _by_geometry(rig: Rig, conventions: Conventions) -> CharacterMap:
 
 
 def _pair(
-    rig: Rig, found: Sequence[geometry.FoundHand], notes: list[str]
+    rig: NamedJoints, found: Sequence[geometry.FoundHand], notes: list[str]
 ) -> Sequence[geometry.FoundHand]:
     """Return the two hands of one size; of several such pairs (feet with toes) the highest."""
 
@@ -226,14 +226,14 @@ def _pair(
     return max(alike, key=height)
 
 
-def _nearest_names(rig: Rig) -> str:
+def _nearest_names(rig: NamedJoints) -> str:
     """Say which finger-like names there are, for the message."""
     words = ("thumb", "index", "finger", "pinky")
     seen = [n for n, k in zip(rig.names, rig.keys, strict=True) if any(w in k for w in words)]
     return f" with two fingers of two joints (seen: {', '.join(seen[:4])})" if seen else ""
 
 
-def _sides(rig: Rig, found: Sequence[geometry.FoundHand]) -> tuple[list[Side], str]:
+def _sides(rig: NamedJoints, found: Sequence[geometry.FoundHand]) -> tuple[list[Side], str]:
     """Sides of one or two hands and what told them."""
     named = [_named_side(rig, hand) for hand in found]
     if None not in named and len(set(named)) == len(named):
@@ -265,7 +265,7 @@ def _sides(rig: Rig, found: Sequence[geometry.FoundHand]) -> tuple[list[Side], s
     return (["left", "right"] if total > 0 else ["right", "left"]), how
 
 
-def _named_side(rig: Rig, hand: geometry.FoundHand) -> Side | None:
+def _named_side(rig: NamedJoints, hand: geometry.FoundHand) -> Side | None:
     """Side of the file's own name for the wrist or arm, else of most of the hand's own names."""
     if any(rig.skeleton.aliases):
         for joint in (hand.wrist, *rig.skeleton.ancestors(hand.wrist)):
@@ -276,7 +276,7 @@ def _named_side(rig: Rig, hand: geometry.FoundHand) -> Side | None:
     return said.pop() if len(said) == 1 and 2 * sides.count(None) < len(sides) else None
 
 
-def _side_above(rig: Rig, hand: geometry.FoundHand) -> Side | None:
+def _side_above(rig: NamedJoints, hand: geometry.FoundHand) -> Side | None:
     """Side that names at the wrist and above it speak of; None if any, or a finger's, disagrees."""
 
     def said(joints: Iterable[int]) -> set[Side]:

@@ -44,7 +44,7 @@ ADVICE = "name the joints in a file and pass it with --map FILE"
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class NamedJoints:
     """A skeleton with what the search asks again and again.
 
     ``aliased``: the joints' names are those that the file gives them besides their own.
@@ -105,7 +105,7 @@ class _Match:
     rank: tuple[int, ...]
 
 
-def match_names(rig: Rig, conventions: Conventions) -> CharacterMap | None:
+def match_names(rig: NamedJoints, conventions: Conventions) -> CharacterMap | None:
     """Map the hands by the convention that fits best; None if none gives a whole hand."""
     matches = [m for c in conventions.conventions for m in _matches(rig, c)]
     matches.sort(key=lambda m: m.rank, reverse=True)  # stable: then the order in the file
@@ -115,7 +115,7 @@ def match_names(rig: Rig, conventions: Conventions) -> CharacterMap | None:
     return None
 
 
-def named_body(rig: Rig, found: CharacterMap, conventions: Conventions) -> CharacterMap:
+def named_body(rig: NamedJoints, found: CharacterMap, conventions: Conventions) -> CharacterMap:
     """Put the arm and body joints with names of the best convention over what was found.
 
     For names that are a file's own statement and need no hand to be believed: its aliases.
@@ -131,7 +131,7 @@ def named_body(rig: Rig, found: CharacterMap, conventions: Conventions) -> Chara
     return replace(found, hands=hands, **body)
 
 
-def _exact(rig: Rig, names: Mapping[str, Sequence[str]]) -> Candidates:
+def _exact(rig: NamedJoints, names: Mapping[str, Sequence[str]]) -> Candidates:
     """Joints with one of the names of each role, and nothing around it."""
     found = {
         role: tuple(j for k in keys for j in rig.by_key.get(k, ())) for role, keys in names.items()
@@ -139,7 +139,7 @@ def _exact(rig: Rig, names: Mapping[str, Sequence[str]]) -> Candidates:
     return {role: joints for role, joints in found.items() if joints}
 
 
-def _matches(rig: Rig, convention: Convention) -> Iterator[_Match]:
+def _matches(rig: NamedJoints, convention: Convention) -> Iterator[_Match]:
     for prefix, suffix in _affixes(rig, convention):
 
         def joints(names: Sequence[str], pre: str = prefix, post: str = suffix) -> tuple[int, ...]:
@@ -165,7 +165,7 @@ def is_hand(roles: Mapping[str, object]) -> bool:
     return sum(f + "MCP" in roles and f + "PIP" in roles for f in FINGERS) >= 2
 
 
-def _affixes(rig: Rig, convention: Convention) -> list[tuple[str, str]]:
+def _affixes(rig: NamedJoints, convention: Convention) -> list[tuple[str, str]]:
     """Most frequent (prefix, suffix) around the names of finger joints; the plain one first."""
     text = "\n".join(rig.by_key)
     found: Counter[tuple[str, str]] = Counter()
@@ -180,7 +180,7 @@ def _affixes(rig: Rig, convention: Convention) -> list[tuple[str, str]]:
 
 
 def _rank(
-    rig: Rig,
+    rig: NamedJoints,
     convention: Convention,
     prefix: str,
     suffix: str,
@@ -217,7 +217,7 @@ def _rank(
     )
 
 
-def _thumb_starts_well(rig: Rig, roles: Candidates) -> bool:
+def _thumb_starts_well(rig: NamedJoints, roles: Candidates) -> bool:
     """Whether the first joint of a thumb with joints missing lies where its name says.
 
     VRM 0 calls the CMC what VRM 1 calls the MCP; of real hands the CMC lies at 0.25 to 0.48 of the
@@ -231,7 +231,7 @@ def _thumb_starts_well(rig: Rig, roles: Candidates) -> bool:
     return bool((thumb < 0.6 * np.mean(knuckles)) == (line[0] == "ThumbCMC")) if line else False
 
 
-def _character(rig: Rig, match: _Match, matches: Sequence[_Match]) -> CharacterMap | None:
+def _character(rig: NamedJoints, match: _Match, matches: Sequence[_Match]) -> CharacterMap | None:
     notes: list[str] = []
     if None in match.hands:
         same = [m for m in matches if m.convention is match.convention]
@@ -253,7 +253,7 @@ def _character(rig: Rig, match: _Match, matches: Sequence[_Match]) -> CharacterM
     return CharacterMap(hands, match.convention.name, **body, notes=tuple(notes))
 
 
-def _refuse_twins(rig: Rig, match: _Match, matches: Sequence[_Match]) -> None:
+def _refuse_twins(rig: NamedJoints, match: _Match, matches: Sequence[_Match]) -> None:
     """Refuse two complete sets of hands with different prefixes and nothing to prefer one."""
     for other in matches:
         if other is match or other.convention is not match.convention:
@@ -270,7 +270,7 @@ def _refuse_twins(rig: Rig, match: _Match, matches: Sequence[_Match]) -> None:
             )
 
 
-def _hand(rig: Rig, side: Side, roles: Candidates, notes: list[str]) -> HandMap | None:
+def _hand(rig: NamedJoints, side: Side, roles: Candidates, notes: list[str]) -> HandMap | None:
     """Choose one joint for each role of a hand; None if it has no wrist."""
     wrist = _wrist(rig, side, roles)
     if wrist is None:
@@ -293,7 +293,7 @@ def _hand(rig: Rig, side: Side, roles: Candidates, notes: list[str]) -> HandMap 
     return HandMap(side, wrist, digits, metacarpals, tips, **arms)
 
 
-def _wrist(rig: Rig, side: Side, roles: Candidates) -> int | None:
+def _wrist(rig: NamedJoints, side: Side, roles: Candidates) -> int | None:
     fingers = [j for f in FINGERS for j in roles.get(f + "MCP", ())]
     if "wrist" not in roles:
         meeting = common_ancestor(rig.skeleton, fingers)
@@ -305,7 +305,7 @@ def _wrist(rig: Rig, side: Side, roles: Candidates) -> int | None:
     return best[0]
 
 
-def _inside(rig: Rig, joints: Sequence[int], wrist: int) -> Sequence[int]:
+def _inside(rig: NamedJoints, joints: Sequence[int], wrist: int) -> Sequence[int]:
     """Of joints with one name, those below the wrist, else those below its parent, else all."""
     for above in (wrist, int(rig.skeleton.parents[wrist])):
         if inside := [j for j in joints if above in rig.above[j]]:
@@ -313,12 +313,12 @@ def _inside(rig: Rig, joints: Sequence[int], wrist: int) -> Sequence[int]:
     return joints
 
 
-def _refuse(rig: Rig, what: str, joints: Sequence[int]) -> NoReturn:
+def _refuse(rig: NamedJoints, what: str, joints: Sequence[int]) -> NoReturn:
     paths = " and ".join(rig.path(j) for j in joints[:2])
     raise HandNotFoundError(f"{len(joints)} joints could be the {what}: {paths}; {ADVICE}")
 
 
-def _settle_thumb(rig: Rig, side: Side, chosen: dict[str, int], notes: list[str]) -> None:
+def _settle_thumb(rig: NamedJoints, side: Side, chosen: dict[str, int], notes: list[str]) -> None:
     """Take a carpal joint for the CMC if the bone lengths say that the last joint is the tip.
 
     From the CMC outwards a thumb's bones get shorter; a carpal bone is shorter than the next.
@@ -333,7 +333,7 @@ def _settle_thumb(rig: Rig, side: Side, chosen: dict[str, int], notes: list[str]
         notes.append(f"{side} thumb CMC by bone lengths: {rig.path(line[0])}")
 
 
-def _fill_gaps(rig: Rig, side: Side, chosen: dict[str, int], notes: list[str]) -> None:
+def _fill_gaps(rig: NamedJoints, side: Side, chosen: dict[str, int], notes: list[str]) -> None:
     """Take the one joint between the first and the third of a digit whose second has no name."""
     for digit in DIGITS:
         first, second, third = (digit + j for j in digit_joints(digit))
@@ -348,7 +348,7 @@ def _fill_gaps(rig: Rig, side: Side, chosen: dict[str, int], notes: list[str]) -
 _TIP_WORDS = ("end", "tip", "nub", "term")
 
 
-def _tip(rig: Rig, digit: str, chosen: Mapping[str, int]) -> int | None:
+def _tip(rig: NamedJoints, digit: str, chosen: Mapping[str, int]) -> int | None:
     """Return the named tip, else the only child of the last joint if it is called an end."""
     if TIPS[digit] in chosen:
         return chosen[TIPS[digit]]
@@ -358,17 +358,19 @@ def _tip(rig: Rig, digit: str, chosen: Mapping[str, int]) -> int | None:
     return ends[0] if len(ends) == 1 and not rig.skeleton.children[ends[0]] else None
 
 
-def _nearest_above(rig: Rig, joints: Sequence[int], *below: int) -> int:
+def _nearest_above(rig: NamedJoints, joints: Sequence[int], *below: int) -> int:
     """Return the lowest of ``joints`` above all of ``below``; the first if none is."""
     above = [j for j in joints if all(j in rig.above[b] for b in below)]
     return max(above, key=lambda j: len(rig.above[j])) if above else joints[0]
 
 
-def _body(rig: Rig, roles: Candidates, wrists: Sequence[int]) -> dict[str, int]:
+def _body(rig: NamedJoints, roles: Candidates, wrists: Sequence[int]) -> dict[str, int]:
     return {r: _nearest_above(rig, roles[r], *wrists) for r in BODY_JOINTS if roles.get(r)}
 
 
-def _unsided_hands(rig: Rig, matches: Sequence[_Match], notes: list[str]) -> dict[Side, HandMap]:
+def _unsided_hands(
+    rig: NamedJoints, matches: Sequence[_Match], notes: list[str]
+) -> dict[Side, HandMap]:
     """Hands of a convention whose names have no side: from other names around, or the shape."""
     hands: dict[Side, HandMap] = {}
     for match in matches:
@@ -394,7 +396,7 @@ def _unsided_hands(rig: Rig, matches: Sequence[_Match], notes: list[str]) -> dic
     return hands
 
 
-def _nearest(rig: Rig, joints: Sequence[int], wrist: int) -> tuple[int, ...]:
+def _nearest(rig: NamedJoints, joints: Sequence[int], wrist: int) -> tuple[int, ...]:
     """Those of ``joints`` that share most ancestors with the wrist."""
     line = rig.above[wrist] | {wrist}
     shared = [len(line & rig.above[j]) for j in joints]

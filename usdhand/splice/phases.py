@@ -34,7 +34,7 @@ _NO_TURN = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class WarpPath:
     """What pass 1 matched: columns ``first`` to ``last`` (rows,) of every row, and their cost."""
 
     first: NDArray[np.int64]
@@ -72,7 +72,7 @@ def phase_path(
     dead_zone: float,
     align: Align = "local",
     directions: Directions = "spread",
-) -> Path:
+) -> WarpPath:
     """Least-cost path through a band under the sign cost, both hands at the same rate.
 
     Parameters
@@ -97,18 +97,18 @@ def phase_path(
         band.low,
         band.high,
     )
-    return Path(first, last, int(cost))
+    return WarpPath(first, last, int(cost))
 
 
 def steadied(
     body: Markers,
     hand: Markers,
-    path: Path,
+    path: WarpPath,
     band: Band,
     smoothing: float,
     dead_zone: float,
     directions: Directions = "spread",
-) -> Path:
+) -> WarpPath:
     """The least-cost path near another one, with turns that change as slowly as performers do.
 
     A turn that is fitted to five frames of small markers is as noisy as they are. Along a path,
@@ -124,7 +124,7 @@ def steadied(
     ours = derivative_signs(turned, smoothing, dead_zone, np.zeros(1), directions)
     theirs = derivative_signs(hand, smoothing, dead_zone, np.zeros(1), directions)
     first, last, cost = phase_dtw.phase_path(ours[0], theirs, *_NO_TURN, band.low, band.high)
-    return Path(first, last, int(cost))
+    return WarpPath(first, last, int(cost))
 
 
 def settled(
@@ -158,7 +158,7 @@ def settled(
     low = np.maximum.accumulate(np.maximum(rows - reach, 0))
     high = np.minimum.accumulate(np.minimum(rows + reach, rows[-1])[::-1])[::-1]
     first, last, cost = phase_dtw.phase_path(ours[0], theirs, *_NO_TURN, low, high)
-    path = Path(first, last, int(cost))
+    path = WarpPath(first, last, int(cost))
     weights = _evidence(ours[0], theirs[0], path.middle, SHIFT_S * body.fps)
     weights[[0, -1]] = 1.0
     weights[(warp < 0.0) | (warp > len(hand) - 1.0)] = LEAST_EVIDENCE

@@ -22,7 +22,7 @@ from usdhand.formats.files import (
 from usdhand.formats.output import check_output, written_beside
 from usdhand.formats.suffixes import USD_SUFFIXES, WRITABLE
 from usdhand.formats.usd.character import character_of, legal_clip
-from usdhand.formats.usd.convert import Placement, placed, write_placed
+from usdhand.formats.usd.convert import StageEdit, placed, write_placed
 from usdhand.formats.usd.stage import find_character
 from usdhand.formats.usd.write import save_layer
 from usdhand.motion import Clip, Problem, resample
@@ -209,17 +209,17 @@ def retarget_hands(hands: Clip, target: Clip, conventions: Conventions | None = 
     return own.decode(kept.replaced(taken.select(shared)), body)
 
 
-def _placement(clip: Clip, edits: Edits, retimed: bool) -> Placement:
+def _placement(clip: Clip, edits: Edits, retimed: bool) -> StageEdit:
     """Return how a stage is placed anew so that ``clip`` starts where it shall."""
     old = clip.origin.time_codes_per_second
     new = edits.fps or (clip.fps if retimed else None)
     offset = 0.0
     if edits.start is not None:
         offset = starting_at(clip, edits.start).origin.first_time_code - clip.start * (new or old)
-    return Placement(new, offset, edits.scale, edits.up)
+    return StageEdit(new, offset, edits.scale, edits.up)
 
 
-def _on_stage(clip: Clip, placement: Placement) -> Clip:
+def _on_stage(clip: Clip, placement: StageEdit) -> Clip:
     """Return a clip as its stage shows it with another placement."""
     per_second = placement.per_second or clip.origin.time_codes_per_second
     origin = replace(

@@ -12,7 +12,7 @@ from usdhand.errors import HandNotFoundError, UsageError
 from usdhand.formats.files import is_usd, read_any
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.output import check_output, written_beside
-from usdhand.formats.usd.takes import Take, read_takes
+from usdhand.formats.usd.shown import ShownMotion, read_shown
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.report.preview.events import (
@@ -136,14 +136,14 @@ def _lanes(
     conventions: Conventions | None,
 ) -> list[Lane]:
     if is_usd(path):
-        takes = read_takes(path, skel, skins=settings.max_points > 0)
+        takes = read_shown(path, skel, skins=settings.max_points > 0)
     else:
-        takes = [Take(read_any(path, skel)[0])]
+        takes = [ShownMotion(read_any(path, skel)[0])]
     return [_lane(take, path, name, i == 0, settings, conventions) for i, take in enumerate(takes)]
 
 
 def _lane(
-    take: Take,
+    take: ShownMotion,
     path: Path,
     name: str,
     first: bool,

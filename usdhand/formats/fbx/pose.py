@@ -18,7 +18,7 @@ MIRROR: Array = np.diag([-1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
-class World:
+class NodePoses:
     """World transforms of nodes in the file's own axes and units, over frames.
 
     ``linear`` and ``unscaled`` (frames, 3, 3), the latter without the node's own scale;
@@ -49,12 +49,12 @@ def right_handed(scene: Scene, axes: Array) -> Scene:
     )
 
 
-def world_transforms(scene: Scene, transforms: Transforms, nodes: Iterable[int]) -> World:
+def world_transforms(scene: Scene, transforms: Transforms, nodes: Iterable[int]) -> NodePoses:
     """Compose the transforms of ``nodes`` and all above them, by each node's way to inherit.
 
     Source: the description of ``ufbx_inherit_mode`` in ufbx.h.
     """
-    world = World({}, {}, {}, {})
+    world = NodePoses({}, {}, {}, {})
     frames = len(transforms)
     one, origin = np.ones((frames, 3)), np.zeros((frames, 3))
     identity = np.broadcast_to(np.eye(3), (frames, 3, 3))

@@ -11,7 +11,7 @@ import numpy as np
 from usdhand.errors import InputError
 from usdhand.formats.fbx.pose import bind_matrices, joint_locals, matrices, right_handed
 from usdhand.formats.fbx.scene import Sampled, Scene, load_scene
-from usdhand.formats.fbx.skeletons import Rig, find_rig, find_take, keyed_takes
+from usdhand.formats.fbx.skeletons import FbxSkeleton, find_skeleton, find_take, keyed_takes
 from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP
@@ -52,7 +52,7 @@ def read_clip(
     scene = _meant(load_scene(path, animation), cm_per_unit, up)
     sampled = find_take(scene, animation)
     take = sampled.take
-    rig = find_rig(scene, skel, take.moved)
+    rig = find_skeleton(scene, skel, take.moved)
     if not rig.moves(take.moved):
         name = rig.name or rig.joints[0]
         raise InputError(f"{path}: the animation '{take.name}' does not move '{name}'.")
@@ -94,7 +94,7 @@ def read_character(
     Raises the same errors as `read_clip`, except for what concerns its animations.
     """
     scene = _meant(load_scene(path, sample=False), cm_per_unit, up)
-    rig = find_rig(scene, skel, frozenset().union(*(take.moved for take in scene.takes)))
+    rig = find_skeleton(scene, skel, frozenset().union(*(take.moved for take in scene.takes)))
     skeleton = _skeleton(scene, rig)
     parents, bind = skeleton.parents, skeleton.bind
     above = np.where((parents >= 0)[:, None, None], bind[parents], np.eye(4))
@@ -133,7 +133,7 @@ def _meant(scene: Scene, cm_per_unit: float | None, up: str | None) -> Scene:
     return right_handed(replace(scene, cm_per_unit=unit, says_axes=says_axes), axes)
 
 
-def _skeleton(scene: Scene, rig: Rig) -> Skeleton:
+def _skeleton(scene: Scene, rig: FbxSkeleton) -> Skeleton:
     rest, _ = joint_locals(scene, rig.nodes, scene.rest)
     return Skeleton(
         rig.joints,
@@ -143,7 +143,7 @@ def _skeleton(scene: Scene, rig: Rig) -> Skeleton:
     )
 
 
-def _origin(scene: Scene, rig: Rig) -> Origin:
+def _origin(scene: Scene, rig: FbxSkeleton) -> Origin:
     return Origin(
         path=scene.path,
         skeleton_path=rig.name,
@@ -153,7 +153,7 @@ def _origin(scene: Scene, rig: Rig) -> Origin:
     )
 
 
-def _scene_problems(scene: Scene, rig: Rig) -> Iterator[Problem]:
+def _scene_problems(scene: Scene, rig: FbxSkeleton) -> Iterator[Problem]:
     if not scene.says_axes:
         yield Problem("no-axes", "the file does not say which axis is up: Y is taken")
     if scene.bind.keys().isdisjoint(rig.nodes):
@@ -161,7 +161,7 @@ def _scene_problems(scene: Scene, rig: Rig) -> Iterator[Problem]:
         yield Problem("missing-bind", message, severity="note")
 
 
-def _time_problems(scene: Scene, rig: Rig, sampled: Sampled) -> Iterator[Problem]:
+def _time_problems(scene: Scene, rig: FbxSkeleton, sampled: Sampled) -> Iterator[Problem]:
     take = sampled.take
     still = sum(node not in take.moved for node in rig.nodes)
     if still:

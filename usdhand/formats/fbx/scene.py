@@ -39,7 +39,7 @@ class Transforms:
 
 
 @dataclass(frozen=True, eq=False)
-class Take:
+class AnimationStack:
     """An animation stack: its name, nodes with keys, and times in seconds as the file has them."""
 
     name: str
@@ -59,7 +59,7 @@ class Sampled:
     key decided about the span, since that of the take cannot be meant.
     """
 
-    take: Take
+    take: AnimationStack
     fps: float
     first: float
     by_keys: bool
@@ -93,7 +93,7 @@ class Scene:
     rest: Transforms
     bind: dict[int, Array]
     skinned: frozenset[int]
-    takes: tuple[Take, ...]
+    takes: tuple[AnimationStack, ...]
     sampled: Sampled | None
     cm_per_unit: float
     axes: Array
@@ -194,8 +194,8 @@ def _scene(path: Path, said: dict[str, Any], numbers: Array) -> Scene:
     )
 
 
-def _take(stack: dict[str, Any]) -> Take:
-    return Take(
+def _take(stack: dict[str, Any]) -> AnimationStack:
+    return AnimationStack(
         name=stack["name"],
         moved=frozenset(stack["moved"]),
         begin=stack["begin"],
@@ -207,7 +207,11 @@ def _take(stack: dict[str, Any]) -> Take:
 
 
 def _sampled(
-    path: Path, said: dict[str, Any], takes: tuple[Take, ...], rest: Transforms, numbers: Array
+    path: Path,
+    said: dict[str, Any],
+    takes: tuple[AnimationStack, ...],
+    rest: Transforms,
+    numbers: Array,
 ) -> Sampled | None:
     if "sampled" not in said:
         return None

@@ -15,7 +15,7 @@ LIMBS = 3  # joints that a chain needs to be a limb
 
 
 @dataclass(frozen=True)
-class Rig:
+class FbxSkeleton:
     """One skeleton of a scene: a name for it, its joints as nodes and as full paths.
 
     Joints come depth first, as in the file; ``above`` are the nodes over the roots. ``name`` is ""
@@ -33,7 +33,7 @@ class Rig:
         return not moved.isdisjoint((*self.nodes, *self.above))
 
 
-def find_rig(scene: Scene, skel: str | None, moved: frozenset[int]) -> Rig:
+def find_skeleton(scene: Scene, skel: str | None, moved: frozenset[int]) -> FbxSkeleton:
     """Return the skeleton of this name, or the only one, or the only one that can be meant.
 
     Of several, those with ``moved`` nodes are preferred, then those that have limbs.
@@ -145,7 +145,7 @@ def _groups(scene: Scene, joints: frozenset[int]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _rig(scene: Scene, roots: Sequence[int], joints: frozenset[int]) -> Rig:
+def _rig(scene: Scene, roots: Sequence[int], joints: frozenset[int]) -> FbxSkeleton:
     children: dict[int, list[int]] = {}
     for node in sorted(joints):
         children.setdefault(int(scene.parents[node]), []).append(node)
@@ -163,7 +163,7 @@ def _rig(scene: Scene, roots: Sequence[int], joints: frozenset[int]) -> Rig:
         paths.append(path)
         waiting += _named(scene, children.get(node, []), path + "/")
     name = scene.names[above[0]] if above else paths[0]
-    return Rig(name or "skeleton", tuple(nodes), tuple(paths), tuple(above))
+    return FbxSkeleton(name or "skeleton", tuple(nodes), tuple(paths), tuple(above))
 
 
 def _named(scene: Scene, nodes: Sequence[int], prefix: str) -> list[tuple[int, str]]:
@@ -172,7 +172,7 @@ def _named(scene: Scene, nodes: Sequence[int], prefix: str) -> list[tuple[int, s
     return [(n, prefix + name) for n, name in zip(nodes, names, strict=True)][::-1]
 
 
-def _likely(rigs: list[Rig], moved: frozenset[int]) -> list[Rig]:
+def _likely(rigs: list[FbxSkeleton], moved: frozenset[int]) -> list[FbxSkeleton]:
     """Rigs that may be meant: each preference holds only while some rig fulfils it."""
     rigs = [rig for rig in rigs if rig.moves(moved)] or rigs
     return [rig for rig in rigs if len(rig.nodes) >= LIMBS] or rigs

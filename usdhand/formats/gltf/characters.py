@@ -18,7 +18,7 @@ MOST_SKIN_JOINTS = 200_000  # of all skins together
 
 
 @dataclass(frozen=True, eq=False)
-class Skin:
+class GltfSkin:
     """Joints of a skin.
 
     Attributes
@@ -34,7 +34,7 @@ class Skin:
 
 
 @dataclass(frozen=True, eq=False)
-class Character:
+class GltfCharacter:
     """Joints that move as one.
 
     Attributes
@@ -47,13 +47,13 @@ class Character:
 
     nodes: tuple[int, ...]
     names: tuple[str, ...]
-    skins: tuple[Skin, ...]
+    skins: tuple[GltfSkin, ...]
     alone: bool = True
 
 
 def find_character(
     document: Document, tree: Tree, humanoid: Humanoid, moving: set[int], skel: str | None
-) -> Character:
+) -> GltfCharacter:
     """Choose the joints of one character.
 
     Skins that share a hierarchy are one character, as the clothes and hair of an avatar are. In a
@@ -75,7 +75,7 @@ def find_character(
     bones = set(humanoid.bones)
     if not skins:
         bones = bones or {node for node in moving if _may_be_joint(tree, node)}
-        groups: list[list[Skin]] = [[]] if bones else []
+        groups: list[list[GltfSkin]] = [[]] if bones else []
     else:
         groups = [skins] if bones else _together(tree, skins)
     if not groups:
@@ -89,9 +89,9 @@ def find_character(
     return _chosen(document.path, found, skel)
 
 
-def read_skins(document: Document, tree: Tree) -> list[Skin]:
+def read_skins(document: Document, tree: Tree) -> list[GltfSkin]:
     """Read all skins."""
-    found: list[Skin] = []
+    found: list[GltfSkin] = []
     together = 0
     if len(document.lists["skins"]) > MOST_SKINS:
         document.json.refuse(f"has more than {MOST_SKINS} skins, which cannot be meant")
@@ -111,11 +111,11 @@ def read_skins(document: Document, tree: Tree) -> list[Skin]:
             joints.refuse("lists a joint twice")
         if (together := together + len(nodes)) > MOST_SKIN_JOINTS:
             joints.refuse(f"and those before it list more than {MOST_SKIN_JOINTS} joints")
-        found.append(Skin(tuple(nodes), tree.common(nodes), wearing.get(i, ()), element))
+        found.append(GltfSkin(tuple(nodes), tree.common(nodes), wearing.get(i, ()), element))
     return found
 
 
-def _together(tree: Tree, skins: list[Skin]) -> list[list[Skin]]:
+def _together(tree: Tree, skins: list[GltfSkin]) -> list[list[GltfSkin]]:
     """Skins grouped by the hierarchy that they share, in the file's order."""
     group = list(range(len(skins)))
     holder: dict[int, int] = {}  # joint -> the first skin that has it
@@ -145,7 +145,9 @@ def _merged(group: list[int], a: int, b: int) -> list[int]:
     return [low if g == high else g for g in group]
 
 
-def _character(tree: Tree, wanted: set[int], skins: list[Skin], moving: set[int]) -> Character:
+def _character(
+    tree: Tree, wanted: set[int], skins: list[GltfSkin], moving: set[int]
+) -> GltfCharacter:
     top = tree.common(sorted(wanted))
     within = tree.below(top) if top >= 0 else tree.order
     leading = set(wanted)  # joints, and nodes that lead to one
@@ -168,7 +170,7 @@ def _character(tree: Tree, wanted: set[int], skins: list[Skin], moving: set[int]
     named = [skin.element.text("name") for skin in skins]
     holders = (top, int(tree.parents[nodes[0]]), nodes[0])
     named += [tree.name(node) for node in holders if node >= 0]
-    return Character(nodes, tuple(dict.fromkeys(n for n in named if n)), tuple(skins))
+    return GltfCharacter(nodes, tuple(dict.fromkeys(n for n in named if n)), tuple(skins))
 
 
 def _drop_leading(tree: Tree, root: int, joints: set[int], wanted: set[int]) -> None:
@@ -188,7 +190,7 @@ def _may_be_joint(tree: Tree, node: int) -> bool:
     return element.get("camera") is None and element.get("skin") is None and lights is None
 
 
-def _chosen(path: Path, found: list[Character], skel: str | None) -> Character:
+def _chosen(path: Path, found: list[GltfCharacter], skel: str | None) -> GltfCharacter:
     labels = _labels(found)
     if skel is None:
         if len(found) == 1:
@@ -202,10 +204,10 @@ def _chosen(path: Path, found: list[Character], skel: str | None) -> Character:
         raise UsageError(f"{path}: has no skeleton '{skel}', only {listed(labels)}.")
     [i] = fitting
     chosen = found[i]
-    return Character(chosen.nodes, (labels[i], *chosen.names), chosen.skins, len(found) == 1)
+    return GltfCharacter(chosen.nodes, (labels[i], *chosen.names), chosen.skins, len(found) == 1)
 
 
-def _labels(found: list[Character]) -> tuple[str, ...]:
+def _labels(found: list[GltfCharacter]) -> tuple[str, ...]:
     """A name for each character that no other has."""
     labels: list[str] = []
     for i, character in enumerate(found):

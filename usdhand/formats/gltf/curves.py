@@ -23,7 +23,7 @@ BLOCK = 4096  # frames worked on at a time
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class KeyCurve:
     """Keys of one property of a node.
 
     Attributes
@@ -39,7 +39,7 @@ class Curve:
     where: str
 
 
-Curves = dict[tuple[int, str], Curve]  # (node, property)
+Curves = dict[tuple[int, str], KeyCurve]  # (node, property)
 
 
 def moved_nodes(document: Document) -> dict[int, set[int]]:
@@ -121,7 +121,7 @@ def read_curves(
     return curves, tuple(problems.values())
 
 
-def evaluate(curve: Curve, keys: Array, frames: int, path: str) -> Array:
+def evaluate(curve: KeyCurve, keys: Array, frames: int, path: str) -> Array:
     """Values (frames, n) of a curve at the frames 0, 1, ..., constant beyond its keys.
 
     Parameters
@@ -148,7 +148,7 @@ def evaluate(curve: Curve, keys: Array, frames: int, path: str) -> Array:
     return rot.make_continuous(found / length)
 
 
-def _between(curve: Curve, values: Array, keys: Array, frames: Array, turned: bool) -> Array:
+def _between(curve: KeyCurve, values: Array, keys: Array, frames: Array, turned: bool) -> Array:
     low = np.clip(np.searchsorted(keys, frames, side="right") - 1, 0, len(keys) - 2)
     gap = keys[low + 1] - keys[low]
     t = np.clip((frames - keys[low]) / np.where(gap > 0, gap, 1.0), 0.0, 1.0)
@@ -171,7 +171,7 @@ def _between(curve: Curve, values: Array, keys: Array, frames: Array, turned: bo
 
 def _curve(
     document: Document, sampler: Element, path: str, rows: dict[tuple[int, str], Array]
-) -> Curve:
+) -> KeyCurve:
     accessors = document.lists["accessors"]
 
     def read(key: str, kind: str) -> tuple[Array, Element]:
@@ -205,4 +205,4 @@ def _curve(
             element.refuse(f"holds a quaternion of no length at key {int(np.argmax(short))}")
         if interpolation == "LINEAR":
             values = rot.normalize(values)
-    return Curve(times, values, interpolation, f"{document.path}: {sampler.where}")
+    return KeyCurve(times, values, interpolation, f"{document.path}: {sampler.where}")

@@ -29,7 +29,7 @@ class Space:
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class JointSpace:
     """What brings local transforms into Y-up centimetres.
 
     Attributes
@@ -92,7 +92,7 @@ def find_placement(
     scales: Array,
     motion: Motion,
     space: Space,
-) -> tuple[Placement, tuple[Problem, ...]]:
+) -> tuple[JointSpace, tuple[Problem, ...]]:
     """Find what stands above joints with local ``scales`` (frames, joints, 3).
 
     Raises
@@ -125,11 +125,11 @@ def find_placement(
             translations[joint] = above[:, :3, 3] @ space.axes.T * space.unit
         if not lengths[joint] * growth[joint] <= LARGEST:
             tree.elements[nodes[joint]].refuse("stands below too large a scale")
-    return Placement(lengths, folded, rotations, translations), tuple(problems.values())
+    return JointSpace(lengths, folded, rotations, translations), tuple(problems.values())
 
 
 def placed(
-    q: Array, t: Array, s: Array, parents: NDArray[np.intp], placement: Placement
+    q: Array, t: Array, s: Array, parents: NDArray[np.intp], placement: JointSpace
 ) -> tuple[Array, Array, Array]:
     """Rotations, translations in cm and scales of joints, from those of the file."""
     t = t * placement.lengths[:, None]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.formats.gltf.accessors import read_rows
-from usdhand.formats.gltf.characters import Character, Skin
+from usdhand.formats.gltf.characters import GltfCharacter, GltfSkin
 from usdhand.formats.gltf.document import Document
 from usdhand.formats.gltf.nodes import Tree, rigid
 from usdhand.motion import Problem
@@ -18,7 +18,7 @@ SMALLEST = 1e-12  # determinant of a matrix that can be inverted
 
 
 def bind_matrices(
-    document: Document, tree: Tree, character: Character, parents: NDArray[np.intp]
+    document: Document, tree: Tree, character: GltfCharacter, parents: NDArray[np.intp]
 ) -> tuple[Array, tuple[Problem, ...]]:
     """Joint-to-world matrices (joints, 4, 4) of the bind pose in file units, without scale.
 
@@ -66,7 +66,9 @@ def bind_matrices(
     return result, tuple(problems)
 
 
-def _in_world(document: Document, tree: Tree, skin: Skin, holder: int) -> dict[int, Array] | None:
+def _in_world(
+    document: Document, tree: Tree, skin: GltfSkin, holder: int
+) -> dict[int, Array] | None:
     """World matrix of each joint of a skin in its bind pose; None where that cannot be told.
 
     ``holder`` is the node above the character.
@@ -98,7 +100,7 @@ def _in_world(document: Document, tree: Tree, skin: Skin, holder: int) -> dict[i
     return dict(zip(joints, _without_scale(best), strict=True))
 
 
-def _joints_above(tree: Tree, skin: Skin) -> NDArray[np.intp]:
+def _joints_above(tree: Tree, skin: GltfSkin) -> NDArray[np.intp]:
     """Place in the skin of the next joint above each joint, -1 if there is none."""
     place = {joint: i for i, joint in enumerate(skin.joints)}
     lines = (tree.above(joint) for joint in skin.joints)

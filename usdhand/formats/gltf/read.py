@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.errors import InputError
-from usdhand.formats.gltf.characters import Character, find_character
+from usdhand.formats.gltf.characters import GltfCharacter, find_character
 from usdhand.formats.gltf.curves import choose, moved_nodes, names_of, read_curves
 from usdhand.formats.gltf.document import Document, read_document, unused
 from usdhand.formats.gltf.nodes import Tree, matrices, read_tree
@@ -87,7 +87,7 @@ class _Scene:
     tree: Tree
     humanoid: Humanoid
     moving: dict[int, set[int]]  # by the number of the animation
-    character: Character
+    character: GltfCharacter
 
     @property
     def nodes(self) -> list[int]:

@@ -108,7 +108,7 @@ def _time_findings(source: Usd.Prim) -> Iterator[Finding]:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class SampledAttribute:
     """All samples of a motion attribute: a row a time, or the default value and no times."""
 
     path: str
@@ -143,10 +143,10 @@ def _value_findings(source: Usd.Prim) -> Iterator[Finding]:
         times = attribute.GetTimeSamples()
         query = Usd.AttributeQuery(attribute)
         rows = [query.Get(time) for time in times] or [query.Get()]
-        yield from _track_findings(Track(str(attribute.GetPath()), joints, times, rows))
+        yield from _track_findings(SampledAttribute(str(attribute.GetPath()), joints, times, rows))
 
 
-def _track_findings(track: Track) -> Iterator[Finding]:
+def _track_findings(track: SampledAttribute) -> Iterator[Finding]:
     blocked = [i for i, row in enumerate(track.rows) if row is None]
     if blocked:
         yield Finding("error", "blocked-sample", f"blocked {track.at(blocked)}", track.path)

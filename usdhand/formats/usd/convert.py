@@ -36,7 +36,7 @@ MENDED = {"missing-translations", "missing-scales"}
 
 
 @dataclass(frozen=True)
-class Placement:
+class StageEdit:
     """How a whole stage is measured, placed and timed anew.
 
     Attributes
@@ -53,7 +53,7 @@ class Placement:
     up: str | None = None
 
 
-def placed(character: Character, placement: Placement) -> Character:
+def placed(character: Character, placement: StageEdit) -> Character:
     """Return a character on a stage in memory that shows its own stage with another placement.
 
     Scale and up axis are transforms on the root prims, so that meshes, cameras and lights go with
@@ -160,7 +160,7 @@ def _one_motion(path: Sdf.Path, name: str, selection: str) -> Problem:
     return Problem("variants", message, str(path))
 
 
-def _turn_and_scale(stage: Usd.Stage, placement: Placement) -> None:
+def _turn_and_scale(stage: Usd.Stage, placement: StageEdit) -> None:
     turn = 0.0
     up = str(UsdGeom.GetStageUpAxis(stage))
     if placement.up is not None and placement.up != up:

@@ -22,7 +22,7 @@ from usdhand.reduce import ReducedRig
 
 
 @dataclass(frozen=True, eq=False)
-class Take:
+class ShownMotion:
     """One motion of a file.
 
     Attributes
@@ -42,7 +42,9 @@ class Take:
     notes: tuple[str, ...] = ()
 
 
-def read_takes(path: str | Path, skel: str | None = None, *, skins: bool = True) -> list[Take]:
+def read_shown(
+    path: str | Path, skel: str | None = None, *, skins: bool = True
+) -> list[ShownMotion]:
     """Read a file's motion, every alternative of `fill` on its own, the selected one first.
 
     A character without motion is one frame of its bind pose.
@@ -57,7 +59,7 @@ def read_takes(path: str | Path, skel: str | None = None, *, skins: bool = True)
     rig = _rig(character)
     surfaces, notes = read_skins(character) if skins else ((), ())
     return [
-        Take(clip, name, surfaces, _warps(character, clip), rig, notes)
+        ShownMotion(clip, name, surfaces, _warps(character, clip), rig, notes)
         for name, clip in clips.items()
     ]
 
