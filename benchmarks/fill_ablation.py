@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from usdhand.evaluate.reconstruction import HandError
-from usdhand.fill import PAPER, PAPER_SEGMENTATION, FillSettings, MotionLibrary
+from usdhand.fill.library import MotionLibrary
+from usdhand.fill.settings import PAPER, PAPER_SEGMENTATION, FillSettings
 from usdhand.motion import Clip
 from usdhand.verbs import fill as filling
 from usdhand.verbs import read_clip

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from usdhand import verbs as api
-from usdhand.fill import FillSettings
+from usdhand.fill.settings import FillSettings
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
 from usdhand.verbs import fill as filling

@@ -21,16 +21,10 @@ from hand_agreement import agreement_of_rigs, off_axis_shares
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
-from usdhand.reduce import (
-    PRESETS,
-    Errors,
-    Fit,
-    ReducedRig,
-    Target,
-    apply_rig,
-    fit_rig,
-    pca_rms,
-)
+from usdhand.reduce.errors import Errors, pca_rms
+from usdhand.reduce.fit import PRESETS, Fit
+from usdhand.reduce.method import Target, apply_rig, fit_rig
+from usdhand.reduce.rig import ReducedRig
 from usdhand.verbs import find_hands, read_clip
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "gestures"

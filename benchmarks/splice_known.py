@@ -28,15 +28,9 @@ from usdhand.anatomy import Side  # noqa: E402
 from usdhand.motion.rotations import Array  # noqa: E402
 from usdhand.splice.band import Band, pinned_band  # noqa: E402
 from usdhand.splice.markers import Markers, hand_markers  # noqa: E402
-from usdhand.splice.method import (  # noqa: E402
-    PAPER,
-    Alignment,
-    Spliced,
-    SpliceSettings,
-    align,
-    splice,
-)
+from usdhand.splice.method import Alignment, Spliced, align, splice  # noqa: E402
 from usdhand.splice.phases import facing, smoothed, steady_turns  # noqa: E402
+from usdhand.splice.settings import PAPER, SpliceSettings  # noqa: E402
 
 SETTINGS = SpliceSettings()
 REAL = HERE.parent / "shared" / "data" / "studiogalt" / "full"

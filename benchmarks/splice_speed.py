@@ -27,8 +27,9 @@ from splice_peers import PEERS
 
 from usdhand import verbs as api
 from usdhand.splice.markers import Markers, hand_markers
-from usdhand.splice.method import SpliceSettings, align, pinned_band
+from usdhand.splice.method import align, pinned_band
 from usdhand.splice.phases import smoothed
+from usdhand.splice.settings import SpliceSettings
 
 HERE = Path(__file__).resolve().parent.parent
 REAL = HERE.parent / "shared" / "data" / "studiogalt" / "full"

@@ -24,7 +24,7 @@ from usdhand import verbs as api
 from usdhand.anatomy.angles import from_euler, from_swing_twist
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
-from usdhand.reduce import ReducedRig
+from usdhand.reduce.rig import ReducedRig
 
 ADD_ON = REPOSITORY / "docs" / "blender" / "usdhand_rig"
 SAMPLES = REPOSITORY / "samples"

@@ -18,8 +18,9 @@ from pxr import Sdf, Usd, UsdSkel
 from usdhand import verbs as api
 from usdhand.anatomy import SIDES
 from usdhand.errors import InputError, UsageError
-from usdhand.fill import PAPER, FillSettings, MotionLibrary
+from usdhand.fill.library import MotionLibrary
 from usdhand.fill.limits import channel_limits
+from usdhand.fill.settings import PAPER, FillSettings
 from usdhand.motion import Clip
 from usdhand.motion.resample import resample
 from usdhand.motion.rotations import Array
@@ -516,7 +517,8 @@ def test_a_body_that_starts_late_is_filled_in_its_own_time(
 
 def test_threads_make_no_difference(body: Clip, library: MotionLibrary) -> None:
     """Nor do shards of the library, merged by (cost, id)."""
-    from usdhand.fill import candidates, space_for
+    from usdhand.fill import candidates
+    from usdhand.fill.method import space_for
     from usdhand.search import PackedSegments, merge, pack, prepare, search
 
     clip = part_of(body, slice(0, 240))
@@ -548,8 +550,8 @@ def test_threads_make_no_difference(body: Clip, library: MotionLibrary) -> None:
 
 def test_people_of_other_build_gesture_alike(library: MotionLibrary) -> None:
     """Ben's arms, by another rig in other units and axes, lie near those of ada's same gestures."""
-    from usdhand.fill import space_for
     from usdhand.fill.candidates import find_candidates, part_rows, part_segments
+    from usdhand.fill.method import space_for
 
     ben = filling.build_library(
         sorted((SAMPLES / "gestures_ben").glob("*.usdc")), Path("ben.usdc").absolute()

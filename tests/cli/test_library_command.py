@@ -16,7 +16,7 @@ from conftest import REPOSITORY
 from pxr import Sdf, Usd
 
 from usdhand.errors import InputError
-from usdhand.fill import MotionLibrary
+from usdhand.fill.library import MotionLibrary
 from usdhand.verbs import fill as filling
 
 GESTURES = REPOSITORY / "samples" / "gestures"

@@ -16,7 +16,7 @@ from pxr import Usd
 from usdhand.cli.splice import command
 from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
 from usdhand.motion import Clip, Skeleton
-from usdhand.splice import SpliceSettings
+from usdhand.splice.settings import SpliceSettings
 from usdhand.verbs import find_hands, read_clip
 from usdhand.verbs.splice import parse_pin, splice_hands
 

@@ -15,10 +15,10 @@ from conftest import REPOSITORY, shared_data
 
 from usdhand import verbs as api
 from usdhand.anatomy import Side
-from usdhand.fill import MotionLibrary, Segmentation, library_clip
 from usdhand.fill.arm import ArmMotion, arm_motion
-from usdhand.fill.library import at_arm_rate
+from usdhand.fill.library import MotionLibrary, at_arm_rate, library_clip
 from usdhand.fill.same import same_motion
+from usdhand.fill.settings import Segmentation
 from usdhand.motion import Clip
 
 SAMPLES = REPOSITORY / "samples"

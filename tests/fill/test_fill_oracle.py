@@ -13,7 +13,8 @@ from oracles import fill_2012 as oracle
 
 from usdhand.fill.assemble import Piece, join, limited
 from usdhand.fill.path import alternative_paths, best_path, path_cost, transition_cost
-from usdhand.fill.segment import Segmentation, segments
+from usdhand.fill.segment import segments
+from usdhand.fill.settings import Segmentation
 from usdhand.motion.rotations import Array
 
 seeds = st.integers(0, 2**32 - 1)

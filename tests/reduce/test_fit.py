@@ -12,15 +12,9 @@ from oracles import reduce_2009
 from usdhand.anatomy.channels import Channels
 from usdhand.errors import InputError
 from usdhand.motion.rotations import Array
-from usdhand.reduce import (
-    PRESETS,
-    ReducedRig,
-    Relation,
-    Statistics,
-    Thresholds,
-    fit_relations,
-    pca_rms,
-)
+from usdhand.reduce.errors import pca_rms
+from usdhand.reduce.fit import PRESETS, Statistics, Thresholds, fit_relations
+from usdhand.reduce.rig import ReducedRig, Relation
 
 KINDS = ("own", "duplicate", "mirrored", "shifted", "constant", "mixed", "negligible")
 

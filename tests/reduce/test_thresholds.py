@@ -10,15 +10,8 @@ from numpy.testing import assert_allclose
 
 from usdhand.errors import QualityError, UsageError
 from usdhand.motion.rotations import Array
-from usdhand.reduce import (
-    Fit,
-    Statistics,
-    Thresholds,
-    fit_relations,
-    thresholds_for_count,
-    thresholds_for_error,
-)
-from usdhand.reduce.search import channel_errors
+from usdhand.reduce.fit import Fit, Statistics, Thresholds, fit_relations
+from usdhand.reduce.search import channel_errors, thresholds_for_count, thresholds_for_error
 
 FITS: tuple[Fit, ...] = ("paper", "least-squares")
 seeds = st.integers(0, 2**32 - 1)

@@ -15,18 +15,21 @@ from conftest import REPOSITORY
 from usdhand import verbs as api
 from usdhand.evaluate.agreement import Agreement
 from usdhand.evaluate.reconstruction import METHODS, HandError
-from usdhand.fill import FillSettings, MotionLibrary
-from usdhand.fill.library import ARM_FPS
+from usdhand.fill.library import ARM_FPS, MotionLibrary
 from usdhand.fill.path import best_path
 from usdhand.fill.results import Filled
+from usdhand.fill.settings import FillSettings
 from usdhand.motion import Clip
-from usdhand.reduce import Reduction, Statistics, pca_rms, thresholds_for_count
-from usdhand.reduce.search import channel_errors, errors_by_count
+from usdhand.reduce.errors import pca_rms
+from usdhand.reduce.fit import Statistics
+from usdhand.reduce.method import Reduction
+from usdhand.reduce.search import channel_errors, errors_by_count, thresholds_for_count
 from usdhand.report.plots import evaluating, filling, reducing, splicing, style
 from usdhand.report.splicing import splice_result
-from usdhand.splice import Spliced, SpliceSettings
 from usdhand.splice.markers import hand_markers
+from usdhand.splice.method import Spliced
 from usdhand.splice.phases import derivative_signs, facing, steady_turns
+from usdhand.splice.settings import SpliceSettings
 from usdhand.verbs import fill as fill_api
 from usdhand.verbs import splice as splice_api
 

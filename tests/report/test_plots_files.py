@@ -18,8 +18,8 @@ from usdhand import verbs as api
 from usdhand.errors import OutputError, UsageError
 from usdhand.evaluate.agreement import Agreement
 from usdhand.report.plots import evaluating, reducing, splicing, style
-from usdhand.splice import SpliceSettings
 from usdhand.splice.markers import hand_markers
+from usdhand.splice.settings import SpliceSettings
 from usdhand.verbs import splice as splice_api
 
 SAMPLES = REPOSITORY / "samples"

@@ -22,11 +22,10 @@ from usdhand.anatomy import Side
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
-from usdhand.splice import Pin, Spliced, SpliceSettings, splice
 from usdhand.splice.markers import Markers
 from usdhand.splice.merge import with_fingers
-from usdhand.splice.method import align
-from usdhand.splice.phases import Align
+from usdhand.splice.method import Spliced, align, splice
+from usdhand.splice.settings import Align, Pin, SpliceSettings
 from usdhand.verbs import find_hands, read_clip
 from usdhand.verbs.splice import splice_hands
 

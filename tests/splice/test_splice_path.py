@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from usdhand.dtw.phases import NEVER, phase_path, sign_costs, signs_along, turn_angles
 from usdhand.errors import UsageError
-from usdhand.splice import SpliceSettings
-from usdhand.splice.band import Pin, anchors_of, band_along, checked_pins, pinned_band
+from usdhand.splice.band import anchors_of, band_along, checked_pins, pinned_band
 from usdhand.splice.markers import Markers
 from usdhand.splice.method import align
 from usdhand.splice.phases import smoothed
 from usdhand.splice.refine import refined
+from usdhand.splice.settings import Pin, SpliceSettings
 from usdhand.splice.warps import EXACT, stiff, through_pins
 
 NO_TURN = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)

@@ -86,7 +86,7 @@ def command(
 
     from usdhand.errors import InputError
     from usdhand.evaluate.agreement import label_agreement
-    from usdhand.fill import PAPER, FillSettings
+    from usdhand.fill.settings import PAPER, FillSettings
     from usdhand.report.document import document, dumps
     from usdhand.report.filling import evaluation_result
     from usdhand.report.plots import evaluating

@@ -34,7 +34,8 @@ from usdhand.cli.common import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from usdhand.fill import Filled, MotionLibrary
+    from usdhand.fill.library import MotionLibrary
+    from usdhand.fill.results import Filled
 
 
 @click.command("fill")
@@ -128,7 +129,7 @@ def command(
 
     from usdhand import verbs as api
     from usdhand.errors import UsageError
-    from usdhand.fill import PAPER, FillSettings
+    from usdhand.fill.settings import PAPER, FillSettings
     from usdhand.formats.output import check_output
     from usdhand.formats.suffixes import USD_SUFFIXES
     from usdhand.report.document import document, dumps

@@ -31,7 +31,7 @@ from usdhand.errors import UsageError, UsdHandError
 from usdhand.formats.suffixes import READABLE
 
 if TYPE_CHECKING:
-    from usdhand.fill import LibraryClip, MotionLibrary
+    from usdhand.fill.library import LibraryClip, MotionLibrary
 
 COLUMNS = {"file", "label", "actor"}
 OUTPUTS = (".usd", ".usda", ".usdc")
@@ -304,7 +304,7 @@ def _segmentation(
 ) -> Any:
     from dataclasses import replace
 
-    from usdhand.fill import Segmentation
+    from usdhand.fill.settings import Segmentation
 
     usual = previous.segmentation if previous else Segmentation()
     given = {"speed": speed, "shortest": shortest, "longest": longest}

@@ -36,7 +36,7 @@ from usdhand.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from usdhand.reduce import Reduction
+    from usdhand.reduce.method import Reduction
 
 
 @click.command("reduce")

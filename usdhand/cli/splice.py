@@ -122,7 +122,7 @@ def command(
     from usdhand.report.document import document, dumps
     from usdhand.report.plots import splicing as plotting
     from usdhand.report.splicing import splice_result
-    from usdhand.splice import SpliceSettings
+    from usdhand.splice.settings import SpliceSettings
     from usdhand.verbs import splice as splicing
 
     settings = SpliceSettings(band=_widths(band), align=align, wrist=wrist)  # type: ignore[arg-type]

@@ -13,7 +13,7 @@ from usdhand.fill.arm import ArmMotion, mirrored
 from usdhand.fill.candidates import part_segments
 from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.fill.metric import Metric
-from usdhand.fill.segment import PAPER_SEGMENTATION, Segmentation
+from usdhand.fill.settings import PAPER_SEGMENTATION, Segmentation
 from usdhand.motion.rotations import Array
 from usdhand.search import pack, prepare, search
 

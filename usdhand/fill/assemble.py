@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 
+from usdhand.fill.settings import Blend
 from usdhand.motion.rotations import Array
-
-Blend = Literal["smooth", "linear"]
 
 # Offsets at a seam that are larger than these are blended out (the paper's thresholds).
 BLEND_MEAN_DEG = 5.0

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from usdhand.fill.arm import ArmMotion
 from usdhand.fill.library import ARM_FPS, MotionLibrary, Part
 from usdhand.fill.metric import Metric
-from usdhand.fill.segment import Segmentation, segments, wrist_speed
+from usdhand.fill.segment import segments, wrist_speed
+from usdhand.fill.settings import Segmentation
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
 from usdhand.search import PackedSegments, SearchIndex, pack, prepare, search, warp_many

@@ -11,7 +11,8 @@ from usdhand.anatomy import Hands, Side
 from usdhand.anatomy.channels import all_channels
 from usdhand.errors import InputError
 from usdhand.fill.arm import FARTHEST_WRIST_CM, ArmMotion, arm_motion
-from usdhand.fill.segment import Segmentation, segments, wrist_speed
+from usdhand.fill.segment import segments, wrist_speed
+from usdhand.fill.settings import Segmentation
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array

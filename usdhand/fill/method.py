@@ -30,8 +30,7 @@ from usdhand.fill.metric import metric
 from usdhand.fill.path import SegmentPath
 from usdhand.fill.results import Alternative, Choice, Filled, FilledPart
 from usdhand.fill.same import same_motion
-from usdhand.fill.segment import Segmentation
-from usdhand.fill.settings import FillSettings
+from usdhand.fill.settings import FillSettings, Segmentation
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 

@@ -77,7 +77,6 @@ METRICS: dict[str, Metric] = {
         ),
     )
 }
-DEFAULT_METRIC = "arm"
 
 
 def metric(name: str) -> Metric:

@@ -2,40 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from usdhand.errors import UsageError
+from usdhand.fill.settings import Segmentation
 from usdhand.motion.rotations import Array
-
-
-@dataclass(frozen=True)
-class Segmentation:
-    """Where to cut. The default was chosen by the error on real takes (docs/fill-figures.md).
-
-    Attributes
-    ----------
-    speed : cm / s at reference height; a border lies where the wrist's speed crosses it
-    shortest, longest : seconds
-    smoothing : seconds, standard deviation of the Gaussian that positions are smoothed with
-    """
-
-    speed: float = 15.0
-    shortest: float = 0.25
-    longest: float = 0.5
-    smoothing: float = 0.05
-
-    def __post_init__(self) -> None:
-        if not (self.speed > 0 and self.shortest > 0 and 2 * self.shortest <= self.longest):
-            raise UsageError(
-                "Segments need a speed > 0, and a longest of at least twice the shortest."
-            )
-
-
-# Section 3.2: no segment under 0.33 s, none over 2 s.
-PAPER_SEGMENTATION = Segmentation(speed=10.0, shortest=0.33, longest=2.0)
 
 
 def wrist_speed(position: Array, fps: float, smoothing: float) -> Array:

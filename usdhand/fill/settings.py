@@ -3,11 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from usdhand.errors import UsageError
-from usdhand.fill.assemble import Blend
-from usdhand.fill.metric import DEFAULT_METRIC
-from usdhand.fill.segment import PAPER_SEGMENTATION, Segmentation
+
+Blend = Literal["smooth", "linear"]
+
+DEFAULT_METRIC = "arm"
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """Where to cut. The default was chosen by the error on real takes (docs/fill-figures.md).
+
+    Attributes
+    ----------
+    speed : cm / s at reference height; a border lies where the wrist's speed crosses it
+    shortest, longest : seconds
+    smoothing : seconds, standard deviation of the Gaussian that positions are smoothed with
+    """
+
+    speed: float = 15.0
+    shortest: float = 0.25
+    longest: float = 0.5
+    smoothing: float = 0.05
+
+    def __post_init__(self) -> None:
+        if not (self.speed > 0 and self.shortest > 0 and 2 * self.shortest <= self.longest):
+            raise UsageError(
+                "Segments need a speed > 0, and a longest of at least twice the shortest."
+            )
+
+
+# Section 3.2: no segment under 0.33 s, none over 2 s.
+PAPER_SEGMENTATION = Segmentation(speed=10.0, shortest=0.33, longest=2.0)
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,9 @@ from usdhand.anatomy import SIDES, Side
 from usdhand.anatomy.hand import SIDE_PREFIX
 from usdhand.evaluate.agreement import Agreement
 from usdhand.evaluate.reconstruction import METHODS, HandError
-from usdhand.fill import Filled, MotionLibrary
 from usdhand.fill.candidates import Candidate, SearchSpace
-from usdhand.fill.library import ARM_FPS
-from usdhand.fill.results import Alternative, Choice, FilledPart
+from usdhand.fill.library import ARM_FPS, MotionLibrary
+from usdhand.fill.results import Alternative, Choice, Filled, FilledPart
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array

@@ -13,7 +13,9 @@ from usdhand.anatomy.hand import CharacterMap, HandMap
 from usdhand.evaluate.compare import Comparison
 from usdhand.formats.usd.check import Finding
 from usdhand.motion import Clip, Problem
-from usdhand.reduce import Errors, ReducedRig, Reduction, pca_rms
+from usdhand.reduce.errors import Errors, pca_rms
+from usdhand.reduce.method import Reduction
+from usdhand.reduce.rig import ReducedRig
 from usdhand.report.document import rounded
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 from usdhand.motion import Clip
 from usdhand.report.document import rounded
-from usdhand.splice import Alignment, Pin, Spliced
+from usdhand.splice.method import Alignment, Spliced
+from usdhand.splice.settings import Pin
 
 
 def splice_result(spliced: Spliced) -> dict[str, Any]:

@@ -12,28 +12,7 @@ from numpy.typing import NDArray
 from usdhand.anatomy.hand import Side
 from usdhand.errors import UsageError
 from usdhand.motion.rotations import Array
-
-
-@dataclass(frozen=True)
-class Pin:
-    """A moment of the body and the moment of the hand clip that belongs to it.
-
-    Attributes
-    ----------
-    body, hand : seconds from the first frame of their clips
-    tolerance : seconds of the hand clip that the warp may be off; 0: exact
-    side : the hand it is for, None for both
-    name : as the user gave it, for messages
-    """
-
-    body: float
-    hand: float
-    tolerance: float = 0.0
-    side: Side | None = None
-    name: str = ""
-
-    def __str__(self) -> str:
-        return self.name or f"{self.body:g} s : {self.hand:g} s"
+from usdhand.splice.settings import Pin
 
 
 @dataclass(frozen=True, eq=False)

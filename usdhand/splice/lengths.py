@@ -8,9 +8,9 @@ from itertools import pairwise
 from usdhand.anatomy import Hands, Side
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
-from usdhand.splice.band import Pin
 from usdhand.splice.markers import hand_markers
 from usdhand.splice.place import RATE, place
+from usdhand.splice.settings import Pin
 
 # Parts whose lengths differ by more than this factor are worth a warning; clips that begin or end
 # together, and differ by more than that one, are not of one performance.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.splice.band import (
     Band,
-    Pin,
     anchors_of,
     band_along,
     checked_pins,
@@ -24,12 +22,11 @@ from usdhand.splice.fingers import held_poses, moving_fingers
 from usdhand.splice.lengths import checked_lengths, pin_advice
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.merge import with_fingers, with_wrist
-from usdhand.splice.phases import Align, Directions, phase_path, settled, smoothed, steadied
+from usdhand.splice.phases import phase_path, settled, smoothed, steadied
 from usdhand.splice.quality import Phase, phase_qualities
 from usdhand.splice.refine import refined
+from usdhand.splice.settings import Pin, SpliceSettings
 from usdhand.splice.warps import through_pins
-
-Wrist = Literal["body", "hands"]
 
 # A hand whose wrist stays within this of its mean, in lengths of the palm, does not move; and one
 # that goes less than this share as far as the other one tells less about timing than that.
@@ -40,48 +37,6 @@ MOST_BAND_S = 10.0
 ROOM_SHARE = 0.25
 # Rounds of matching signs with the hand clip in the body's time.
 ROUNDS = 2
-
-
-@dataclass(frozen=True)
-class SpliceSettings:
-    """How clips are aligned; the defaults are the measured best, `PAPER` has the paper's axes.
-
-    Attributes
-    ----------
-    band : widths of the bands of pass 1 and pass 2, as shares of the body's length
-    least_band : seconds that bands have at least: performers of short clips are off by as much as
-        those of long ones
-    pins : moments that belong together
-    align : "local" fits a turn about the vertical wherever motions are compared, "trunk" measures
-        it from the trunks
-    wrist : whose wrist rotation the result has
-    directions : of the derivatives' signs, see `usdhand.splice.phases.sign_axes`
-    fps : rate at which motion is compared
-    smoothing : of positions before derivatives are taken, standard deviation in seconds
-    shared_smoothing : the same, as soon as both clips are in the body's time
-    dead_zone : share of their RMS below which derivatives count as zero
-    tether : seconds of the hand clip that pass 2 may typically move pass 1 by; 0: no pass 2
-    """
-
-    band: tuple[float, float] = (0.3, 0.1)
-    least_band: float = 1.5
-    pins: tuple[Pin, ...] = ()
-    align: Align = "local"
-    wrist: Wrist = "body"
-    directions: Directions = "spread"
-    fps: float = 60.0
-    smoothing: float = 0.045
-    shared_smoothing: float = 0.065
-    dead_zone: float = 0.06
-    tether: float = 0.3
-
-    def __post_init__(self) -> None:
-        if not all(0.0 < width <= 1.0 for width in self.band):
-            raise UsageError("Bands are shares of the body's length: above 0 and at most 1.")
-
-
-# Signs along x, y and z only, as the paper has them.
-PAPER = SpliceSettings(directions="axes")
 
 
 @dataclass(frozen=True, eq=False)

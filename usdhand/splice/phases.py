@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +10,8 @@ from numpy.typing import NDArray
 from usdhand.motion.rotations import Array
 from usdhand.splice.band import Band
 from usdhand.splice.markers import Markers, shown_at
+from usdhand.splice.settings import Align, Directions
 from usdhand.splice.warps import EXACT, monotone, stiff
-
-Align = Literal["local", "trunk"]
-Directions = Literal["spread", "axes"]
 
 WINDOW = 5  # frames of the window that a turn about the vertical is fitted to
 TURNS = 32

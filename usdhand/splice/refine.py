@@ -8,7 +8,8 @@ import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.splice.markers import Markers, shown_at
-from usdhand.splice.phases import Align, alike, smoothed
+from usdhand.splice.phases import alike, smoothed
+from usdhand.splice.settings import Align
 from usdhand.splice.warps import EXACT, monotone, stiff
 
 # Standard deviations of Gaussians in seconds: of what is compared; of the mean that positions and

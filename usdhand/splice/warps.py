@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from usdhand.motion.rotations import Array
-from usdhand.splice.band import Pin
+from usdhand.splice.settings import Pin
 
 # Seconds to either side of a pin over which a matched warp gives way. Matching knows the pins, so
 # that little is missing: a path that jumps to a pin does so in one row.

@@ -8,10 +8,11 @@ from pathlib import Path
 from usdhand.anatomy import SIDES, Side
 from usdhand.errors import HandNotFoundError, UsdHandError
 from usdhand.evaluate.reconstruction import HandError, reconstruction_errors
-from usdhand.fill import Filled, FillSettings, LibraryClip, MotionLibrary, fill
 from usdhand.fill.candidates import SearchSpace
-from usdhand.fill.library import Left, Part
-from usdhand.fill.method import moving_sides
+from usdhand.fill.library import Left, LibraryClip, MotionLibrary, Part
+from usdhand.fill.method import fill, moving_sides
+from usdhand.fill.results import Filled
+from usdhand.fill.settings import FillSettings
 from usdhand.formats.files import read_clip, reopened, source_file
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.add_joints import author_joints, joint_count
@@ -131,7 +132,7 @@ def measure_library(
     -------
     errors, and the clips that could not be filled, or have still fingers, with the reason
     """
-    from usdhand.fill import space_for
+    from usdhand.fill.method import space_for
 
     conventions = load_conventions(*maps)
     sources: list[Clip | LibraryClip] = list(library.clips if takes is None else takes)

@@ -10,7 +10,7 @@ import numpy as np
 
 from usdhand.anatomy import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError, UsdHandError
-from usdhand.fill import LibraryClip, MotionLibrary
+from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.formats.files import read_character, read_clip
 from usdhand.motion import Clip
 from usdhand.rigs import Conventions

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from usdhand.errors import InputError, UsageError, UsdHandError
-from usdhand.fill import LibraryClip, MotionLibrary, Segmentation, library_clip
-from usdhand.fill.library import Left
+from usdhand.fill.library import Left, LibraryClip, MotionLibrary, library_clip
+from usdhand.fill.settings import Segmentation
 from usdhand.formats.files import read_clip
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.library import is_library, read_library, relative_path, write_library

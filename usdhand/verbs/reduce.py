@@ -14,17 +14,10 @@ from usdhand.formats.files import read_any, reopened
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.motion import Clip, Problem
 from usdhand.motion.resample import in_time_of
-from usdhand.reduce import (
-    PRESETS,
-    Fit,
-    ReducedRig,
-    Reduction,
-    Target,
-    Thresholds,
-    apply_rig,
-    fit_rig,
-)
-from usdhand.reduce import expand as expand_channels
+from usdhand.reduce.fit import PRESETS, Fit, Thresholds
+from usdhand.reduce.method import Reduction, Target, apply_rig, fit_rig
+from usdhand.reduce.method import expand as expand_channels
+from usdhand.reduce.rig import ReducedRig
 from usdhand.rigs import Conventions
 from usdhand.verbs.clips import find_hands
 

@@ -15,7 +15,8 @@ from usdhand.formats.usd.warp import author_warps
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip, Problem
 from usdhand.rigs import Conventions
-from usdhand.splice import Pin, Spliced, SpliceSettings, splice
+from usdhand.splice.method import Spliced, splice
+from usdhand.splice.settings import Pin, SpliceSettings
 from usdhand.verbs.clips import find_hands
 
 __all__ = ["parse_pin", "splice_hands", "write_spliced"]

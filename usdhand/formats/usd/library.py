@@ -28,7 +28,7 @@ from usdhand.fill.library import (
     pack_arm,
     unpack_arm,
 )
-from usdhand.fill.segment import Segmentation
+from usdhand.fill.settings import Segmentation
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.stage import open_stage, usd_diagnostics

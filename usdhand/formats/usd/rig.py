@@ -26,8 +26,8 @@ from usdhand.formats.usd.stage import (
 from usdhand.formats.usd.write import free_child, write_motion
 from usdhand.motion import Clip, Problem
 from usdhand.motion.rotations import Array
-from usdhand.reduce import ReducedRig, Reduction, Relation
-from usdhand.reduce.rig import Kind, evaluation_order
+from usdhand.reduce.method import Reduction
+from usdhand.reduce.rig import Kind, ReducedRig, Relation, evaluation_order
 
 RIG_NAME = "HandRig"
 LARGEST = 1e6  # degrees, or anything else a rig counts: more cannot be meant

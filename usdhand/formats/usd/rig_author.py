@@ -9,7 +9,8 @@ from pxr import Sdf, Vt
 
 from usdhand.formats.hashing import file_hash
 from usdhand.motion.rotations import Array
-from usdhand.reduce import Reduction, Relation
+from usdhand.reduce.method import Reduction
+from usdhand.reduce.rig import Relation
 
 VERSION = 1
 CHANNEL_PREFIX = "usdhand:channel"

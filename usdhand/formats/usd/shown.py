@@ -18,7 +18,7 @@ from usdhand.formats.usd.stage import Character, find_character
 from usdhand.formats.usd.warp import SCOPE_NAME
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
-from usdhand.reduce import ReducedRig
+from usdhand.reduce.rig import ReducedRig
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from usdhand.anatomy import Hands
-from usdhand.fill import Filled, MotionLibrary
 from usdhand.fill.arm import arm_motion
-from usdhand.fill.library import ARM_FPS, Part, at_arm_rate
-from usdhand.fill.results import FilledPart
+from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate
+from usdhand.fill.results import Filled, FilledPart
 from usdhand.fill.segment import wrist_speed
 from usdhand.motion import Clip
 from usdhand.report.plots import style

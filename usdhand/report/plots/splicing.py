@@ -14,10 +14,10 @@ from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.report.plots import style
 from usdhand.report.plots.style import BLACK, GREY, ORANGE, SKY, styled
-from usdhand.splice import Alignment, Spliced, SpliceSettings
 from usdhand.splice.markers import Markers, hand_markers
-from usdhand.splice.method import first_band
+from usdhand.splice.method import Alignment, Spliced, first_band
 from usdhand.splice.phases import derivative_signs, facing, facing_forward, steady_turns
+from usdhand.splice.settings import SpliceSettings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -19,7 +19,7 @@ from usdhand.report.preview.pack import Pack
 
 if TYPE_CHECKING:
     from usdhand.formats.usd.skins import Skin
-    from usdhand.reduce import Relation
+    from usdhand.reduce.rig import Relation
 
 HAND_LENGTH = 18.0  # cm of the hand that thicknesses are given for
 FINGER_RADIUS, PALM_RADIUS = 0.55, 0.4

@@ -1,0 +1,76 @@
+"""What a user may set of splice, and the paper's own values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from usdhand.errors import UsageError
+
+Align = Literal["local", "trunk"]
+Directions = Literal["spread", "axes"]
+Wrist = Literal["body", "hands"]
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A moment of the body and the moment of the hand clip that belongs to it.
+
+    Attributes
+    ----------
+    body, hand : seconds from the first frame of their clips
+    tolerance : seconds of the hand clip that the warp may be off; 0: exact
+    side : the hand it is for, None for both
+    name : as the user gave it, for messages
+    """
+
+    body: float
+    hand: float
+    tolerance: float = 0.0
+    side: Literal["left", "right"] | None = None
+    name: str = ""
+
+    def __str__(self) -> str:
+        return self.name or f"{self.body:g} s : {self.hand:g} s"
+
+
+@dataclass(frozen=True)
+class SpliceSettings:
+    """How clips are aligned; the defaults are the measured best, `PAPER` has the paper's axes.
+
+    Attributes
+    ----------
+    band : widths of the bands of pass 1 and pass 2, as shares of the body's length
+    least_band : seconds that bands have at least: performers of short clips are off by as much as
+        those of long ones
+    pins : moments that belong together
+    align : "local" fits a turn about the vertical wherever motions are compared, "trunk" measures
+        it from the trunks
+    wrist : whose wrist rotation the result has
+    directions : of the derivatives' signs, see `usdhand.splice.phases.sign_axes`
+    fps : rate at which motion is compared
+    smoothing : of positions before derivatives are taken, standard deviation in seconds
+    shared_smoothing : the same, as soon as both clips are in the body's time
+    dead_zone : share of their RMS below which derivatives count as zero
+    tether : seconds of the hand clip that pass 2 may typically move pass 1 by; 0: no pass 2
+    """
+
+    band: tuple[float, float] = (0.3, 0.1)
+    least_band: float = 1.5
+    pins: tuple[Pin, ...] = ()
+    align: Align = "local"
+    wrist: Wrist = "body"
+    directions: Directions = "spread"
+    fps: float = 60.0
+    smoothing: float = 0.045
+    shared_smoothing: float = 0.065
+    dead_zone: float = 0.06
+    tether: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not all(0.0 < width <= 1.0 for width in self.band):
+            raise UsageError("Bands are shares of the body's length: above 0 and at most 1.")
+
+
+# Signs along x, y and z only, as the paper has them.
+PAPER = SpliceSettings(directions="axes")
