@@ -22,8 +22,8 @@ from scipy.spatial.transform import Rotation
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate_rotations
-from usdhand.reduce.fit import PRESETS
-from usdhand.reduce.method import Target, apply_rig, fit_rig
+from usdhand.reduce.method import apply_rig, fit_rig
+from usdhand.reduce.settings import PRESETS, Target
 from usdhand.verbs import find_hands, read_clip
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "gestures" / "ok_01.usdc"

@@ -22,9 +22,9 @@ from usdhand.anatomy.channels import Channels, Hands
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.reduce.errors import Errors, pca_rms
-from usdhand.reduce.fit import PRESETS, Fit
-from usdhand.reduce.method import Target, apply_rig, fit_rig
+from usdhand.reduce.method import apply_rig, fit_rig
 from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.settings import PRESETS, Fit, Target
 from usdhand.verbs import find_hands, read_clip
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "gestures"

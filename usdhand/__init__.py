@@ -10,6 +10,7 @@ from typing import Any
 from usdhand.version import __version__
 
 __all__ = [
+    "ReduceSettings",
     "__version__",
     "apply_rig",
     "build_library",

@@ -39,3 +39,9 @@ class QualityError(UsdHandError):
     """A quality limit that was asked for cannot be met (exit 5)."""
 
     exit_code = 5
+
+
+class CancelledError(UsdHandError):
+    """Work was stopped by whoever watched its progress (exit 130)."""
+
+    exit_code = 130

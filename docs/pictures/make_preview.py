@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 from usdhand import verbs as api
 from usdhand.report.document import document, dumps
-from usdhand.report.filling import fill_result
+from usdhand.report.fill import fill_result
 from usdhand.verbs import fill as filling
 from usdhand.verbs.preview import preview_clips, write_preview
 

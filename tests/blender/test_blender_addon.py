@@ -25,6 +25,7 @@ from usdhand.anatomy.angles import from_euler, from_swing_twist
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.settings import ReduceSettings
 
 ADD_ON = REPOSITORY / "docs" / "blender" / "usdhand_rig"
 SAMPLES = REPOSITORY / "samples"
@@ -49,7 +50,7 @@ def blender(folder: Path, **session: object) -> dict[str, object]:
 
 
 def reduced(clip: Clip, target: Path, **settings: object) -> ReducedRig:
-    [reduction] = api.reduce_hands([clip], **settings)  # type: ignore[arg-type]
+    [reduction] = api.reduce_hands([clip], ReduceSettings(**settings))  # type: ignore[arg-type]
     api.write_rig(reduction, target)
     return reduction.rig
 

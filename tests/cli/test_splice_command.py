@@ -12,8 +12,8 @@ import pytest
 from click.testing import CliRunner, Result
 from conftest import REPOSITORY
 from pxr import Usd
-
 from usdhand.cli.splice import command
+
 from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
 from usdhand.motion import Clip, Skeleton
 from usdhand.splice.settings import SpliceSettings

@@ -13,7 +13,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.usd.check import check_file
-from usdhand.formats.usd.findings import Finding
+from usdhand.problems import Problem
 
 SKEL_BINDING = "usdSkelValidators:SkelBindingApiAppliedValidator.MissingSkelBindingAPI"
 METADATA = "usdGeomValidators:StageMetadataChecker.Missing"
@@ -285,8 +285,8 @@ def test_what_is_no_usd_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_finding_as_a_sentence() -> None:
-    assert str(Finding("error", "code", "it is wrong", "/A")) == "error: it is wrong (/A) [code]"
-    assert str(Finding("warning", "code", "it is odd")) == "warning: it is odd [code]"
+    assert str(Problem("code", "it is wrong", "/A", "error")) == "error: it is wrong (/A) [code]"
+    assert str(Problem("code", "it is odd", severity="warning")) == "warning: it is odd [code]"
 
 
 @pytest.mark.real_data

@@ -15,6 +15,7 @@ from pxr import Sdf
 from usdhand import verbs as api
 from usdhand.formats.schema import schema_folder
 from usdhand.formats.usd.rig import CHANNEL_PREFIX
+from usdhand.reduce.settings import ReduceSettings
 
 READ = """
 import json, sys
@@ -36,7 +37,7 @@ print(json.dumps({
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("schema") / "rig.usda"
     clip = api.read_clip(REPOSITORY / "samples" / "gestures" / "turn_01.usdc")
-    [reduction] = api.reduce_hands([clip], fit="least-squares", most_controllers=2)
+    [reduction] = api.reduce_hands([clip], ReduceSettings(fit="least-squares", controllers=2))
     api.write_rig(reduction, path)
     return path
 

@@ -13,8 +13,9 @@ from usdhand.anatomy.channels import Channels
 from usdhand.errors import InputError
 from usdhand.motion.rotations import Array
 from usdhand.reduce.errors import pca_rms
-from usdhand.reduce.fit import PRESETS, Statistics, Thresholds, fit_relations
+from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.rig import ReducedRig, Relation
+from usdhand.reduce.settings import PRESETS, Thresholds
 
 KINDS = ("own", "duplicate", "mirrored", "shifted", "constant", "mixed", "negligible")
 

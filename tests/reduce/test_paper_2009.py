@@ -17,9 +17,10 @@ from oracles import reduce_2009
 from usdhand.anatomy.channels import model_channels
 from usdhand.anatomy.hand import HAND_JOINTS
 from usdhand.motion.rotations import Array
-from usdhand.reduce.fit import PRESETS, Statistics, fit_relations
+from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.rig import Relation
 from usdhand.reduce.search import thresholds_for_count
+from usdhand.reduce.settings import PRESETS
 
 FRAMES = 820
 NAMES = (*model_channels("left", HAND_JOINTS), *model_channels("right", HAND_JOINTS))

@@ -15,9 +15,9 @@ from usdhand.anatomy.channels import Channels, Hands
 from usdhand.anatomy.hand import SIDES, CharacterMap
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
-from usdhand.reduce.fit import PRESETS, Thresholds
-from usdhand.reduce.method import Target, apply_rig, expand, fit_rig
+from usdhand.reduce.method import apply_rig, expand, fit_rig
 from usdhand.reduce.rig import ReducedRig, Relation, evaluation_order
+from usdhand.reduce.settings import PRESETS, Target, Thresholds
 
 
 def linear(name: str, *controllers: str, slope: float = 2.0, offset: float = 1.0) -> Relation:

@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose
 
 from usdhand.errors import QualityError, UsageError
 from usdhand.motion.rotations import Array
-from usdhand.reduce.fit import Fit, Statistics, Thresholds, fit_relations
+from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.search import channel_errors, thresholds_for_count, thresholds_for_error
+from usdhand.reduce.settings import Fit, Thresholds
 
 FITS: tuple[Fit, ...] = ("paper", "least-squares")
 seeds = st.integers(0, 2**32 - 1)

@@ -24,8 +24,9 @@ from usdhand.reduce.errors import pca_rms
 from usdhand.reduce.fit import Statistics
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.search import channel_errors, errors_by_count, thresholds_for_count
+from usdhand.reduce.settings import ReduceSettings
 from usdhand.report.plots import evaluating, filling, reducing, splicing, style
-from usdhand.report.splicing import splice_result
+from usdhand.report.splice import splice_result
 from usdhand.splice.markers import hand_markers
 from usdhand.splice.method import Spliced
 from usdhand.splice.phases import derivative_signs, facing, steady_turns
@@ -126,7 +127,9 @@ def test_followers_lie_where_their_channels_are(reduction: Reduction) -> None:
 
 
 def test_several_controllers_are_drawn_against_the_first(talk: Clip) -> None:
-    [found] = api.reduce_hands([talk], free_channels=12, fit="least-squares", most_controllers=3)
+    [found] = api.reduce_hands(
+        [talk], ReduceSettings(free_channels=12, fit="least-squares", controllers=3)
+    )
     relation = next(r for r in found.rig.relations if len(r.controllers) == 3)
     figure = reducing.followers([found])
     own = dict(zip(found.source.names, found.source.values.T, strict=True))
@@ -227,9 +230,9 @@ def test_several_clips_are_one_motion() -> None:
 
 
 def test_nothing_to_show_is_no_plot(talk: Clip) -> None:
-    [free] = api.reduce_hands([talk], range_deg=0.0)
+    [free] = api.reduce_hands([talk], ReduceSettings(range_deg=0.0))
     assert set(reducing.figures([free])) == {"reduce_histograms", "reduce_errors"}
-    [still] = api.reduce_hands([api.read_clip(BODY)], preset=1)
+    [still] = api.reduce_hands([api.read_clip(BODY)], ReduceSettings(preset=1))
     assert set(reducing.figures([still])) == {"reduce_histograms", "reduce_errors"}
 
 

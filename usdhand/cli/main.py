@@ -2,53 +2,43 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import click
 
+from usdhand.cli.command import command_of
 from usdhand.errors import UsdHandError
+from usdhand.requests.verbs import GROUPS, VERBS
 from usdhand.version import __version__
-
-# Verb -> (module, one line of help). Kept here so that `--help` imports no verb.
-VERBS = {
-    "inspect": "Show skeletons, timing, units, hands and problems of files.",
-    "reduce": "Reduce hands to a rig of a few free channels.",
-    "expand": "Turn a reduced rig back into motion, on its own or another character.",
-    "library": "Build a motion library, and show what is in one.",
-    "fill": "Give a body clip the fingers of similar motions from a library.",
-    "splice": "Put the fingers of a hand clip on a body clip, retimed to it.",
-    "evaluate": "Measure how well a library tells fingers from arms.",
-    "compare": "Compare two motions: degrees, fingertips, smoothness, lag.",
-    "convert": "Convert between USD, BVH, glTF and FBX; put fingers on other characters.",
-    "preview": "Make a page to look at clips with in a browser.",
-    "check": "Check files with UsdValidation and rules of our own.",
-    "schema": "Print the folder of the USD schema for PXR_PLUGINPATH_NAME.",
-}
 
 
 class VerbGroup(click.Group):
     """Loads verbs late, and turns our errors into one message and an exit code."""
 
+    def __init__(self, *args: Any, prefix: str = "", **details: Any) -> None:
+        super().__init__(*args, **details)
+        self.prefix = prefix  # "library " for the verbs of that group
+
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Verbs in the order of the work."""
+        """Verbs in the order of the work, one that is a group of verbs once."""
         del ctx
-        return list(VERBS)
+        own = [v.removeprefix(self.prefix) for v in VERBS if v.startswith(self.prefix)]
+        return list(dict.fromkeys(verb.split()[0] for verb in own))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import a verb's module."""
-        del ctx
-        if cmd_name not in VERBS:
+        """Import a verb's options."""
+        if cmd_name not in self.list_commands(ctx):
             return None
-        module = importlib.import_module(f"usdhand.cli.{cmd_name}")
-        command: click.Command = module.command
-        return command
+        verb = self.prefix + cmd_name
+        if verb in GROUPS:
+            return VerbGroup(cmd_name, prefix=f"{verb} ", help=GROUPS[verb])
+        return command_of(verb)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the verbs without importing them."""
-        del ctx
         with formatter.section("Verbs"):
-            formatter.write_dl(list(VERBS.items()))
+            names = [(name, self.prefix + name) for name in self.list_commands(ctx)]
+            formatter.write_dl([(n, GROUPS.get(v) or VERBS[v][1]) for n, v in names])
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a verb; what a person can mend ends in a message, not in a traceback."""

@@ -16,6 +16,7 @@ from usdhand.fill.settings import Segmentation
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
+from usdhand.problems import Problem
 from usdhand.rigs.height import body_height
 
 # Arms are searched at this rate; fingers keep that of their clip.
@@ -82,14 +83,6 @@ class LibraryClip:
     hands: Mapping[Side, LibraryHand]
 
 
-@dataclass(frozen=True)
-class Left:
-    """A clip that was left out, and why."""
-
-    path: str
-    reason: str
-
-
 @dataclass(frozen=True, eq=False)
 class MotionLibrary:
     """Clips in order of their names, and how they were cut.
@@ -100,8 +93,8 @@ class MotionLibrary:
 
     clips: tuple[LibraryClip, ...]
     segmentation: Segmentation = field(default_factory=Segmentation)
-    left_out: tuple[Left, ...] = ()
-    damaged: tuple[Left, ...] = ()
+    left_out: tuple[Problem, ...] = ()
+    damaged: tuple[Problem, ...] = ()
 
     @property
     def minutes(self) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from usdhand.errors import UsageError
+from usdhand.options import option
 
 Blend = Literal["smooth", "linear"]
 
@@ -59,8 +60,10 @@ class FillSettings:
     couple : take both hands from the same clip
     """
 
-    metric: str = DEFAULT_METRIC
-    k: int = 5
+    metric: str = option(
+        "How arm motions are compared: arm, chordal or euler (the paper's).", default=DEFAULT_METRIC
+    )
+    k: int = option("Candidates a segment.", default=5, at_least=1)
     factor: float = 1.5
     pool: int = 20
     sharpness: float = 0.5
@@ -72,8 +75,10 @@ class FillSettings:
     angle_weight: float = 1.0
     velocity_weight: float = 0.5
     blend: Blend = "smooth"
-    alternatives: int = 1
-    couple: bool = False
+    alternatives: int = option(
+        "Distinct results, as variants of the animation.", default=1, at_least=1
+    )
+    couple: bool = option("Take both hands from the same clip.", default=False)
 
     def __post_init__(self) -> None:
         if self.k < 1 or self.alternatives < 1:

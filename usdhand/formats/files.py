@@ -3,37 +3,17 @@
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from usdhand.errors import InputError, UsageError
+from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.formats.suffixes import FORMATS, READABLE, USD_SUFFIXES
 from usdhand.formats.usd import read as usd
 from usdhand.formats.usd.character import character_of, legal_clip
 from usdhand.formats.usd.stage import Character, find_character
 from usdhand.motion import Clip, Problem
-
-
-@dataclass(frozen=True)
-class Reading:
-    """What to read of a file, and what it means where it does not say so itself.
-
-    Attributes
-    ----------
-    skel : path or name of the skeleton where there are several
-    animation : name of the animation where there are several (never in USD)
-    cm_per_unit : centimetres of one unit, instead of what the file says or what is guessed
-    up : "Y" or "Z", likewise
-    """
-
-    skel: str | None = None
-    animation: str | None = None
-    cm_per_unit: float | None = None
-    up: str | None = None
-
-
-DEFAULT = Reading()
 
 
 def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFAULT) -> Clip:
@@ -121,7 +101,7 @@ def reopened(clip: Clip) -> Character:
         origin.skeleton_path or None,
         origin.animation_path or None,
         origin.cm_per_unit,
-        origin.up_axis,
+        "Z" if origin.up_axis == "Z" else "Y",
     )
     animated = bool(origin.animation_path)
     source = (read_clip if animated else read_character)(path, None, reading)

@@ -7,7 +7,7 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,29 +17,49 @@ from usdhand.errors import OutputError
 def check_output(
     output: Path, inputs: Iterable[Path], force: bool, suffixes: Iterable[str]
 ) -> None:
-    """Refuse an output before any work is done.
+    """Refuse an output before any work is done; see `check_outputs`."""
+    check_outputs([output], inputs, force, suffixes)
+
+
+def check_outputs(
+    outputs: Sequence[Path], inputs: Iterable[Path], force: bool, suffixes: Iterable[str]
+) -> None:
+    """Refuse outputs before any work is done.
 
     Raises
     ------
     OutputError
-        if its format is unknown, it is one of the inputs, it exists and ``force`` is not given, or
-        its folder is missing or read-only.
+        if the format of one is unknown, it is one of the inputs, it exists and ``force`` is not
+        given, or its folder is missing or read-only.
     """
-    if output.suffix.lower() not in tuple(suffixes):
-        raise OutputError(
-            f"{output}: cannot write '{output.suffix}' files; use one of {', '.join(suffixes)}."
-        )
-    for path in inputs:
-        if path.exists() and output.exists() and path.samefile(output):
+    suffixes = tuple(suffixes)
+    for output in outputs:
+        if output.suffix.lower() not in suffixes:
+            raise OutputError(
+                f"{output}: cannot write '{output.suffix}' files; use one of {', '.join(suffixes)}."
+            )
+    own = {found for path in inputs if (found := _identity(path)) is not None}
+    for output in outputs:
+        identity = _identity(output)
+        if identity is not None and identity in own:
             raise OutputError(f"{output} is an input of this command; inputs are never changed.")
-    if output.is_dir():
-        raise OutputError(f"{output} is a folder; give a file.")
-    if output.exists() and not force:
-        raise OutputError(f"{output} exists; use --force to replace it.")
-    folder = output.absolute().parent
-    if not folder.is_dir():
-        raise OutputError(f"{folder}: no such folder to write {output.name} to.")
-    _check_writable(folder)
+        if output.is_dir():
+            raise OutputError(f"{output} is a folder; give a file.")
+        if identity is not None and not force:
+            raise OutputError(f"{output} exists; use --force to replace it.")
+    for folder, output in {o.absolute().parent: o for o in reversed(outputs)}.items():
+        if not folder.is_dir():
+            raise OutputError(f"{folder}: no such folder to write {output.name} to.")
+        _check_writable(folder)
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """What tells a file from others, whatever its path; None for what is not there."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    return found.st_dev, found.st_ino
 
 
 def check_folder(folder: Path) -> None:

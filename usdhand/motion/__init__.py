@@ -1,9 +1,10 @@
 """Motion as values: skeletons, clips, forward kinematics, rotations, resampling."""
 
-from usdhand.motion.clip import Clip, Origin, Problem
+from usdhand.motion.clip import Clip, Origin
 from usdhand.motion.kinematics import Pose, forward_kinematics
 from usdhand.motion.resample import resample
 from usdhand.motion.skeleton import Skeleton, leaf_name, parents_from_paths
+from usdhand.problems import Problem
 
 __all__ = [
     "Clip",

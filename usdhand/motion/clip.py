@@ -4,29 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Something a person should know about a file, that did not stop the work.
-
-    ``code`` is a stable name for scripts, ``where`` a prim, joint or frame. A ``note`` is right as
-    it is and only good to know.
-    """
-
-    code: str
-    message: str
-    where: str = ""
-    severity: Literal["warning", "note"] = "warning"
-
-    def __str__(self) -> str:
-        return f"{self.message} ({self.where})" if self.where else self.message
+from usdhand.problems import Problem
 
 
 @dataclass(frozen=True, eq=False)

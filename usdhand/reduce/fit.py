@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.motion.rotations import Array
 from usdhand.reduce.rig import Relation
-
-Fit = Literal["paper", "least-squares"]
+from usdhand.reduce.settings import Fit, Thresholds
 
 # Two numbers that differ by less are the same: rounding errors must not decide who controls whom.
 # Degrees for ranges and (relative) standard deviations; a distance of standardised curves is a
@@ -28,23 +26,6 @@ SAME_DISTANCE = 1e-7
 # A curve whose range is below this is constant whatever the threshold: what float32 leaves of a
 # joint that does not move cannot be standardised.
 SMALLEST_RANGE_DEG = 1e-6
-
-
-@dataclass(frozen=True)
-class Thresholds:
-    """What counts as barely moving (``range`` in degrees) and as following (``rmsd``)."""
-
-    range: float
-    rmsd: float
-
-
-# The paper's four steps (section 5). Steps 2 and 4 work on the curves left by steps 1 and 3.
-PRESETS: dict[int, Thresholds] = {
-    1: Thresholds(1.0, 0.0),
-    2: Thresholds(1.0, 0.3),
-    3: Thresholds(5.0, 0.0),
-    4: Thresholds(5.0, 0.5),
-}
 
 
 @dataclass(frozen=True, eq=False)

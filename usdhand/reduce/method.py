@@ -11,23 +11,10 @@ from usdhand.anatomy.channels import Channels, Hands
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
 from usdhand.reduce.errors import Errors, distances, measure_errors
-from usdhand.reduce.fit import Fit, Statistics, Thresholds, fit_relations
+from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.search import thresholds_for_count, thresholds_for_error
-
-
-@dataclass(frozen=True)
-class Target:
-    """What a reduction aims at: exactly one of the three."""
-
-    thresholds: Thresholds | None = None
-    free_channels: int | None = None
-    max_error: float | None = None
-
-    def __post_init__(self) -> None:
-        given = [x is not None for x in (self.thresholds, self.free_channels, self.max_error)]
-        if sum(given) != 1:
-            raise UsageError("Give either thresholds, a number of channels, or a largest error.")
+from usdhand.reduce.settings import Fit, Target, Thresholds
 
 
 @dataclass(frozen=True, eq=False)

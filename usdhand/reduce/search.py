@@ -9,14 +9,8 @@ from numpy.typing import NDArray
 
 from usdhand.errors import QualityError, UsageError
 from usdhand.motion.rotations import Array
-from usdhand.reduce.fit import (
-    SAME_DEG,
-    SAME_DISTANCE,
-    Fit,
-    Statistics,
-    Thresholds,
-    controllers_at,
-)
+from usdhand.reduce.fit import SAME_DEG, SAME_DISTANCE, Statistics, controllers_at
+from usdhand.reduce.settings import Fit, Thresholds
 
 
 def thresholds_for_count(statistics: Statistics, count: int, fit: Fit = "paper") -> Thresholds:

@@ -12,18 +12,24 @@ from pathlib import Path
 from typing import Any
 
 from usdhand.formats.hashing import file_hash
+from usdhand.requests.base import Request
+from usdhand.requests.codec import to_data
 from usdhand.version import __version__
 
 SCHEMA_VERSION = 1
 
 
 def document(
-    verb: str, inputs: Sequence[Path], settings: Mapping[str, Any], result: Mapping[str, Any]
+    request: Request,
+    inputs: Sequence[Path],
+    settings: Mapping[str, Any],
+    result: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Wrap a result with what is needed to make it again."""
     return {
-        "schema": f"usdhand.{verb}/{SCHEMA_VERSION}",
+        "schema": f"usdhand.{request.verb.split()[0]}/{SCHEMA_VERSION}",
         "usdhand": __version__,
+        "request": to_data(request),
         "inputs": [{"path": str(p), "sha256": file_hash(p)} for p in inputs],
         "settings": dict(settings),
         **result,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -72,11 +72,12 @@ class Alignment:
 
 @dataclass(frozen=True, eq=False)
 class Spliced:
-    """The body with the hand clip's fingers, how each hand was aligned, and what was odd."""
+    """The body with the hand clip's fingers, how each hand was aligned, what was odd, and how."""
 
     clip: Clip
     hands: Mapping[Side, Alignment]
     notes: tuple[str, ...] = ()
+    settings: SpliceSettings = field(default_factory=SpliceSettings)
 
 
 def splice(
@@ -139,7 +140,7 @@ def splice(
         clip, names = with_fingers(clip, hand_clip, frames, other, warp, exact)
         hands[side] = replace(alignment, channels=names)
     notes += held_poses(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
-    return Spliced(clip, hands, tuple(notes))
+    return Spliced(clip, hands, tuple(notes), settings)
 
 
 def align(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from usdhand.errors import UsageError
+from usdhand.options import option
 
 Align = Literal["local", "trunk"]
 Directions = Literal["spread", "axes"]
@@ -34,6 +35,21 @@ class Pin:
         return self.name or f"{self.body:g} s : {self.hand:g} s"
 
 
+def read_band(text: str) -> tuple[float, float]:
+    """Read two numbers with a comma between.
+
+    Raises
+    ------
+    ValueError
+        if it is no such text.
+    """
+    try:
+        first, second = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise ValueError(f"'{text}': give two numbers, such as 0.3,0.1.") from error
+    return first, second
+
+
 @dataclass(frozen=True)
 class SpliceSettings:
     """How clips are aligned; the defaults are the measured best, `PAPER` has the paper's axes.
@@ -55,11 +71,21 @@ class SpliceSettings:
     tether : seconds of the hand clip that pass 2 may typically move pass 1 by; 0: no pass 2
     """
 
-    band: tuple[float, float] = (0.3, 0.1)
+    band: tuple[float, float] = option(
+        "How far the clips' timing may differ in both passes, as shares of the body's length.",
+        default=(0.3, 0.1),
+        metavar="FIRST,SECOND",
+        read=read_band,
+        shown="0.3,0.1",
+    )
     least_band: float = 1.5
     pins: tuple[Pin, ...] = ()
-    align: Align = "local"
-    wrist: Wrist = "body"
+    align: Align = option(
+        "How the clips are turned to each other: by the motion around every frame, or by the "
+        "trunks.",
+        default="local",
+    )
+    wrist: Wrist = option("Which clip the wrists' rotation comes from.", default="body")
     directions: Directions = "spread"
     fps: float = 60.0
     smoothing: float = 0.045

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from usdhand.anatomy import SIDES, Hands, Side
 from usdhand.errors import HandNotFoundError, UsageError
-from usdhand.evaluate.compare import Comparison, compare_clips
 from usdhand.formats.files import reopened
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip, Problem
@@ -74,10 +73,3 @@ def write_clip(
     return write_motion(
         character, clip, changed, Path(output), flatten=flatten, force=force, inputs=inputs
     )
-
-
-def compare(
-    a: Clip, b: Clip, *, align: bool = False, conventions: Conventions | None = None
-) -> Comparison:
-    """Compare motion B with motion A; see `usdhand.evaluate.compare.compare_clips`."""
-    return compare_clips(a, b, find_hands(a, conventions), find_hands(b, conventions), align)

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
 from usdhand.anatomy import SIDES
-from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.errors import HandNotFoundError, UsageError, UsdHandError
 from usdhand.formats.files import (
-    DEFAULT,
-    Reading,
     animation_names,
     is_usd,
     read_any,
     read_character,
     write_other,
 )
-from usdhand.formats.output import check_output, written_beside
+from usdhand.formats.output import (
+    check_folder,
+    check_output,
+    check_outputs,
+    make_folder,
+    written_beside,
+)
+from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.formats.suffixes import USD_SUFFIXES, WRITABLE
 from usdhand.formats.usd.character import character_of, legal_clip
 from usdhand.formats.usd.convert import StageEdit, placed, write_placed
@@ -28,38 +35,14 @@ from usdhand.formats.usd.write import save_layer
 from usdhand.motion import Clip, Problem, resample
 from usdhand.motion.editing import counted_in_frames, in_place, scaled, starting_at, trim
 from usdhand.motion.resample import in_time_of
+from usdhand.report.convert import convert_result, summary
+from usdhand.requests.convert import ConvertRequest, Edits
 from usdhand.rigs import Conventions, map_character
-from usdhand.verbs.clips import find_hands
+from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.verbs.files import find_files
+from usdhand.verbs.outcome import Journal, Outcome
 
-RootMotion = Literal["keep", "drop"]
 MOST_FRAMES = 10_000_000
-
-
-@dataclass(frozen=True)
-class Edits:
-    """What is done to a clip between reading and writing.
-
-    Attributes
-    ----------
-    fps : frames a second to resample to
-    start : time code of the first frame in the output
-    trim : first and last time code to keep, in the input's time codes
-    scale : factor on the character's size
-    root_motion : "drop" keeps the hips over the spot where they start
-    up : "Y" or "Z", the up axis of the output (USD and BVH)
-    """
-
-    fps: float | None = None
-    start: float | None = None
-    trim: tuple[float | None, float | None] = (None, None)
-    scale: float = 1.0
-    root_motion: RootMotion = "keep"
-    up: str | None = None
-
-    @property
-    def of_frames(self) -> bool:
-        """Whether the motion itself is another one afterwards."""
-        return self.fps is not None or self.trim != (None, None) or self.root_motion == "drop"
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,4 +252,108 @@ def _hips(clip: Clip, conventions: Conventions | None) -> int:
     return int(np.flatnonzero(clip.skeleton.parents < 0)[0]) if found is None else found
 
 
-__all__ = ["Converted", "Edits", "Reading", "convert", "edit_frames", "retarget_hands", "write_new"]
+@dataclass(frozen=True)
+class _Job:
+    """One file to write."""
+
+    path: Path
+    reading: Reading
+    target: Path
+
+
+def run(request: ConvertRequest, journal: Journal) -> Outcome:
+    """Convert every file, or every animation of one; of several, bad ones are left out."""
+    if request.onto_skel is not None and request.onto is None:
+        raise UsageError("--onto-skel chooses a skeleton of --onto CHARACTER, which is not given.")
+    conventions = conventions_from(request.maps)
+    paths = find_files(request.files)
+    jobs, code = _jobs(paths, request, journal)
+    results: list[dict[str, Any]] = []
+    written: list[Path] = []
+    for job in journal.each(jobs, "converting"):
+        result: dict[str, Any] = {"path": str(job.path), "output": None}
+        results.append(result)
+        try:
+            done = _converted(job, request, conventions)
+        except UsdHandError as error:
+            if len(jobs) == 1:
+                raise
+            journal.fail(error)
+            code = max(code, error.exit_code)
+            result |= {"error": str(error)}
+            continue
+        result |= convert_result(done.source, done.clip, done.animated, done.lost, conventions)
+        journal.about(job.path, done.source.problems, "warning")
+        journal.about(job.target, done.lost, "warning")
+        if not request.dry_run:
+            result["output"] = str(job.target)
+            written.append(job.target)
+    inputs = (*paths, *filter(None, [request.onto]), *request.maps)
+    return Outcome(
+        request,
+        inputs,
+        lambda: {"files": results},
+        summary,
+        written=tuple(written),
+        exit_code=code,
+    )
+
+
+def _converted(job: _Job, request: ConvertRequest, conventions: Conventions | None) -> Converted:
+    return convert(
+        job.path,
+        job.target,
+        request.edits,
+        job.reading,
+        onto=request.onto,
+        onto_reading=Reading(skel=request.onto_skel),
+        conventions=conventions,
+        force=request.force,
+        dry_run=request.dry_run,
+    )
+
+
+def _jobs(
+    paths: Sequence[Path], request: ConvertRequest, journal: Journal
+) -> tuple[list[_Job], int]:
+    """What to read and where to write it, and the exit code of files that cannot be read."""
+    output, folder = request.output, request.out_dir
+    if output is not None and folder is None:
+        if request.to is not None and output.suffix.lower() != f".{request.to}":
+            raise UsageError(f"--to {request.to} and -o {output} contradict each other.")
+        if len(paths) > 1:
+            raise UsageError(f"{len(paths)} inputs need --out-dir DIR instead of -o.")
+        check_output(output, paths, request.force, WRITABLE)
+        return [_Job(paths[0], request.reading, output)], 0
+    if folder is None or output is not None:
+        raise UsageError("Give either -o OUTPUT or --out-dir DIR.")
+    check_folder(folder)
+    jobs: list[_Job] = []
+    code = 0
+    for path in paths:
+        try:
+            each = _each(path, request.reading)
+        except UsdHandError as error:
+            journal.fail(error)
+            code = max(code, error.exit_code)
+            continue
+        suffix = request.to or "usdc"
+        jobs += [_Job(path, own, folder / f"{name}.{suffix}") for name, own in each]
+    counts = Counter(job.target for job in jobs)
+    if double := next((target for target, count in counts.items() if count > 1), None):
+        raise UsageError(f"Two results would both be {double}; convert them to several folders.")
+    make_folder(folder)
+    check_outputs([job.target for job in jobs], paths, request.force, WRITABLE)
+    return jobs, code
+
+
+def _each(path: Path, reading: Reading) -> list[tuple[str, Reading]]:
+    """A name and a reading for every animation of a file."""
+    names = () if reading.animation is not None else animation_names(path)
+    if len(names) < 2:
+        return [(path.stem, reading)]
+    return [(f"{path.stem}.{_file_part(name)}", replace(reading, animation=name)) for name in names]
+
+
+def _file_part(name: str) -> str:
+    return "".join(c if c.isalnum() or c in "-_" else "_" for c in name)

@@ -1,48 +1,40 @@
-"""Method 2 on clips and files: fill bodies from a library, measure it."""
+"""Method 2 on clips and files: fingers for a body from a library."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from usdhand.anatomy import SIDES, Side
-from usdhand.errors import HandNotFoundError, UsdHandError
-from usdhand.evaluate.reconstruction import HandError, reconstruction_errors
-from usdhand.fill.candidates import SearchSpace
-from usdhand.fill.library import Left, LibraryClip, MotionLibrary, Part
-from usdhand.fill.method import fill, moving_sides
+from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.fill.library import MotionLibrary
+from usdhand.fill.method import fill
 from usdhand.fill.results import Filled
 from usdhand.fill.settings import FillSettings
-from usdhand.formats.files import read_clip, reopened, source_file
+from usdhand.formats.files import read_clip, reopened
 from usdhand.formats.hashing import file_hash
+from usdhand.formats.output import check_output
+from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.add_joints import author_joints, joint_count
-from usdhand.formats.usd.library import is_library, read_library, write_library
+from usdhand.formats.usd.library import is_library, read_library
 from usdhand.formats.usd.write import write_motion
-from usdhand.motion import Clip, Problem
-from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands
-from usdhand.verbs.finger_joints import lacks_fingers
-from usdhand.verbs.library import (
-    BuildResult,
-    build_library,
-    forget_interrupted,
-    gone_clips,
-    label_of,
-)
+from usdhand.motion import Clip
+from usdhand.problems import Problem
+from usdhand.report.fill import fill_result, summary
+from usdhand.report.fill_problems import fill_problems
+from usdhand.report.plots import filling as plotting
+from usdhand.report.plots.style import check_plots
+from usdhand.requests.fill import FillRequest
+from usdhand.requests.shared import sides
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.verbs.finger_joints import add_fingers, lacks_fingers
+from usdhand.verbs.outcome import Journal, Outcome
 
-__all__ = [
-    "BuildResult",
-    "build_library",
-    "fill_fingers",
-    "forget_interrupted",
-    "gone_clips",
-    "is_library",
-    "label_of",
-    "measure_library",
-    "read_library",
-    "write_filled",
-    "write_library",
-]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def fill_fingers(
@@ -113,60 +105,63 @@ def write_filled(
     )
 
 
-def measure_library(
-    library: MotionLibrary,
-    folder: Path,
-    settings: FillSettings,
-    *,
-    takes: Sequence[Clip] | None = None,
-    maps: Sequence[Path] = (),
-) -> tuple[list[HandError], list[Left]]:
-    """Fill every clip of a library from the others and compare with its true fingers.
+def run(request: FillRequest, journal: Journal) -> Outcome:
+    """Fill a body's fingers from a library."""
+    output, wanted = request.output, sides(request.side)
+    given = [request.body, request.library, *filter(None, [request.fingers_from])]
+    check_output(output, given, request.force, USD_SUFFIXES)
+    if request.plots is not None:
+        check_plots(request.plots, plotting.NAMES, request.force)
+    conventions = conventions_from(request.maps)
+    library = read_library(request.library)
+    for entry in library.damaged:
+        message = f"{entry.file} of the library cannot be used: {entry.message}"
+        journal.warn("damaged", message)
+    clip = _read_body(request)
+    journal.about(request.body, clip.problems, "warning")
+    added = add_fingers(request, clip, library, conventions, journal)
+    filled = fill_fingers(
+        added.grafted.clip if added else clip,
+        library,
+        request.settings,
+        sides=wanted,
+        replace_motion=request.replace,
+        conventions=conventions,
+    )
+    journal.tell(*fill_problems(filled, library, request.settings, str(request.body)))
+    if not request.dry_run:
+        lost = write_filled(
+            filled, output, flatten=request.flatten, force=request.force, inputs=given[1:]
+        )
+        journal.about(output, lost, "warning", "note")
 
-    Parameters
-    ----------
-    folder : of the library, which its clips' paths are relative to
-    takes : clips to fill instead, such as those of another rig
+    def report() -> dict[str, Any]:
+        body = added.grafted.clip if added else clip
+        result = fill_result(filled, library, body)
+        result["output"] = None if request.dry_run else str(output)
+        if added:
+            joints = {hand: list(paths) for hand, paths in added.grafted.added.items()}
+            result |= {"added_joints": joints, "fingers_from": added.source}
+        return result
 
-    Returns
-    -------
-    errors, and the clips that could not be filled, or have still fingers, with the reason
-    """
-    from usdhand.fill.method import space_for
+    def figures() -> dict[str, Figure]:
+        body = added.grafted.clip if added else clip
+        return plotting.figures(filled, body, find_hands(body, conventions, wanted), library)
 
-    conventions = load_conventions(*maps)
-    sources: list[Clip | LibraryClip] = list(library.clips if takes is None else takes)
-    spaces: dict[Part, SearchSpace] = {
-        (side,): space_for(library, (side,), settings)
-        for side in SIDES
-        if any(side in c.hands for c in library.clips)
-    }
-    errors: list[HandError] = []
-    left: list[Left] = []
-    for source in sources:
-        try:
-            clip = _library_source(source, folder) if isinstance(source, LibraryClip) else source
-            hands = find_hands(clip, conventions)
-            moving = moving_sides(hands.encode(clip), hands)
-            # The library has no still hands, so of its own clips there is nothing to say.
-            if still := [] if takes is None else [s for s in hands.frames if s not in moving]:
-                which = " and ".join(still)
-                left.append(Left(clip.name, f"the {which} fingers do not move: no truth to meet"))
-            if not moving:
-                continue
-            errors += reconstruction_errors(
-                clip,
-                hands,
-                library,
-                settings,
-                sides=moving,
-                content_hash=file_hash(source_file(clip)),
-                spaces=None if settings.couple else spaces,
-            )
-        except UsdHandError as error:
-            left.append(Left(source.name, str(error)))
-    return errors, left
+    cutting = request.settings.segmentation or library.segmentation
+    return Outcome(
+        request,
+        (*given, *request.maps),
+        report,
+        summary,
+        settings={"segmentation": asdict(cutting), "add_fingers": bool(added)},
+        figures=figures,
+        written=() if request.dry_run else (output,),
+    )
 
 
-def _library_source(clip: LibraryClip, folder: Path) -> Clip:
-    return read_clip(folder / clip.path, clip.skel or None)
+def _read_body(request: FillRequest) -> Clip:
+    body = request.body
+    if body.suffix.lower() in USD_SUFFIXES and is_library(body):
+        raise UsageError(f"{body} is a motion library; give the clip to be filled, then --library.")
+    return read_clip(body, request.skel)

@@ -13,11 +13,15 @@ from usdhand.errors import InputError, UsdHandError
 from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.formats.files import read_character, read_clip
 from usdhand.motion import Clip
+from usdhand.problems import listed
+from usdhand.requests.fill import FillRequest
+from usdhand.requests.shared import sides as sides_of
 from usdhand.rigs import Conventions
 from usdhand.rigs.bare import bare_arms
 from usdhand.rigs.graft import Grafted, add_finger_joints
 from usdhand.rigs.height import body_height
 from usdhand.verbs.clips import find_hands
+from usdhand.verbs.outcome import Journal
 
 # Characters of a library that are tried, most fitting first, before it is said that none is there.
 TRIED = 8
@@ -122,3 +126,32 @@ def _by_fit(
     joints_then_height = sorted(first.values(), key=lambda e: (-fit(e)[0], -fit(e)[1], e.name))
     # Where a character's first clip is gone, its others may be there.
     return joints_then_height + [e for e in library.clips if first[character(e)] is not e]
+
+
+def add_fingers(
+    request: FillRequest,
+    clip: Clip,
+    library: MotionLibrary,
+    conventions: Conventions | None,
+    journal: Journal,
+) -> WithFingers | None:
+    """Add the finger joints that a request asks for, where the body has none; else say so."""
+    wanted = sides_of(request.side)
+    bare = lacks_fingers(clip, conventions, wanted)
+    if not (request.add_fingers or request.fingers_from):
+        if bare and len(bare) < len(wanted):
+            message = f"the {bare[0]} hand has no finger joints; --add-fingers adds some"
+            journal.warn("no-finger-joints", message, request.body)
+        return None
+    if not bare:
+        journal.warn("has-fingers", f"{request.body} has finger joints, so none are added")
+        return None
+    if request.fingers_from:
+        added = fingers_like(clip, request.fingers_from, conventions, bare)
+    else:
+        folder = request.library.absolute().parent
+        added = fingers_from_library(clip, library, folder, conventions, bare)
+    for hand, stubs in thumb_stubs(clip, conventions, bare).items():
+        message = f"{hand} hand: {listed(stubs)} stays as it is beside the added thumb"
+        journal.warn("thumb-stub", message)
+    return added

@@ -5,17 +5,19 @@ from __future__ import annotations
 import multiprocessing
 import re
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from usdhand.errors import InputError, UsageError, UsdHandError
-from usdhand.fill.library import Left, LibraryClip, MotionLibrary, library_clip
+from usdhand.fill.library import LibraryClip, MotionLibrary, library_clip
 from usdhand.fill.settings import Segmentation
 from usdhand.formats.files import read_clip
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.library import is_library, read_library, relative_path, write_library
+from usdhand.problems import Problem
+from usdhand.progress import Progress, each
 from usdhand.rigs import load_conventions
 from usdhand.verbs.clips import find_hands
 
@@ -59,7 +61,7 @@ def build_library(
     rebuild: bool = False,
     maps: Sequence[Path] = (),
     jobs: int = 1,
-    progress: Callable[[Iterable[object], int], Iterable[object]] | None = None,
+    progress: Progress | None = None,
     keep: float = 10.0,
 ) -> BuildResult:
     """Read clips into a library; a clip that cannot be used is left out with its reason.
@@ -75,7 +77,8 @@ def build_library(
     jobs : processes
     keep : seconds after which what was read is kept beside the output, so that a build that was
         interrupted goes on where it was
-    progress : wraps the iteration over finished clips; gets it and their number
+    progress : gets how many clips are read and how many there are; False stops, and what was read
+        is kept as after an interruption
 
     Raises
     ------
@@ -87,14 +90,14 @@ def build_library(
     known = _known([None if rebuild else previous, _read_kept(kept)])
     tasks: list[_Task] = []
     clips: list[LibraryClip] = []
-    left: list[Left] = []
+    left: list[Problem] = []
     used: set[str] = set()
     contents = [file_hash(path) for path in paths]
     before = _Before.of(previous, contents)
     for path, name, content in zip(paths, _unique_names(paths), contents, strict=True):
         relative = relative_path(path, output)
         if content is None:
-            left.append(Left(relative, "no such file"))
+            left.append(Problem("left-out", "no such file", file=relative))
             continue
         old, cut_as = known.get((content, relative)) or known.get((content, "")) or (None, cutting)
         row = _row_of(path, labels or {})
@@ -110,7 +113,7 @@ def build_library(
     results = _run(tasks, jobs)
     next_time = time.monotonic() + keep
     try:
-        for done in progress(results, len(tasks)) if progress else results:
+        for done in each(results, len(tasks), progress):
             (clips if isinstance(done, LibraryClip) else left).append(done)  # type: ignore[arg-type]
             if time.monotonic() > next_time:
                 # A tenth of the time at most: the larger the library, the rarer.
@@ -119,10 +122,10 @@ def build_library(
         _keep(clips[unchanged:], cutting, kept)
         raise
     if not clips:
-        reasons = "; ".join(f"{entry.path}: {entry.reason}" for entry in left[:3])
+        reasons = "; ".join(f"{entry.file}: {entry.message}" for entry in left[:3])
         raise InputError(f"No clip can be used for a library. {reasons}")
     ordered = tuple(sorted(clips, key=lambda c: c.name))
-    library = MotionLibrary(ordered, cutting, tuple(sorted(left, key=lambda entry: entry.path)))
+    library = MotionLibrary(ordered, cutting, tuple(sorted(left, key=lambda entry: entry.file)))
     unmatched = tuple(file for file in labels or {} if file not in used)
     here = {*contents, *(relative_path(path, output) for path in paths)}
     removed = tuple(
@@ -237,13 +240,13 @@ def label_of(stem: str) -> str:
     return found.group(1) if found else ""
 
 
-def _run(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Left]:
+def _run(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Problem]:
     if jobs <= 1 or len(tasks) < 2:
         return map(_read, tasks)
     return _in_processes(tasks, jobs)
 
 
-def _in_processes(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Left]:
+def _in_processes(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Problem]:
     # Not forked: USD has threads, and a copy of a process with threads may hang.
     pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"))
     try:
@@ -252,11 +255,11 @@ def _in_processes(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | L
         pool.shutdown(cancel_futures=True)
 
 
-def _read(task: _Task) -> LibraryClip | Left:
+def _read(task: _Task) -> LibraryClip | Problem:
     try:
         clip = read_clip(task.path)
         if len(clip) < 2:
-            return Left(task.relative, "it is a single frame")
+            return Problem("left-out", "it is a single frame", file=task.relative)
         conventions = load_conventions(*task.maps) if task.maps else None
         made = library_clip(
             clip,
@@ -268,12 +271,16 @@ def _read(task: _Task) -> LibraryClip | Left:
             actor=task.actor,
         )
         if not made.hands:
-            return Left(task.relative, "its fingers do not move")
+            return Problem("left-out", "its fingers do not move", file=task.relative)
         return replace(made, name=task.name)
     except UsdHandError as error:
         # The reason stands beside the path, which need not be in it again.
         reason = str(error).removeprefix(f"{task.path}: ")
-        return Left(task.relative, "it is a motion library" if is_library(task.path) else reason)
+        return Problem(
+            "left-out",
+            "it is a motion library" if is_library(task.path) else reason,
+            file=task.relative,
+        )
 
 
 def _cut_again(clip: LibraryClip, segmentation: Segmentation) -> LibraryClip:

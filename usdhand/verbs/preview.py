@@ -26,31 +26,15 @@ from usdhand.report.preview.events import (
 from usdhand.report.preview.lanes import Lane, lane_data, unshown
 from usdhand.report.preview.pack import Pack
 from usdhand.report.preview.page import figure, page
+from usdhand.report.preview.summary import preview_result, summary
+from usdhand.requests.preview import PreviewRequest, PreviewSettings
 from usdhand.rigs import Conventions
-from usdhand.verbs.clips import find_hands
-
-__all__ = ["PreviewSettings", "Previewed", "preview_clips", "write_preview"]
+from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.verbs.files import find_files
+from usdhand.verbs.outcome import Journal, Outcome
 
 PAGE_SUFFIXES = (".html", ".htm")
 MOST_SHOWN = 6  # lanes, when the page opens
-
-
-@dataclass(frozen=True)
-class PreviewSettings:
-    """What goes into a page.
-
-    Attributes
-    ----------
-    max_frames : longer clips keep every second, third, ... frame, so that they have no more
-    max_points : characters with larger meshes are shown as bones; 0 for no meshes at all
-    """
-
-    max_frames: int = 10_800
-    max_points: int = 40_000
-
-    def __post_init__(self) -> None:
-        if self.max_frames < 2:
-            raise UsageError(f"A page of {self.max_frames} frames shows no motion: give 2 or more.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,3 +213,30 @@ def _names(files: Sequence[Path]) -> dict[Path, str]:
         return file.name
 
     return {file: name(file) for file in files}
+
+
+def run(request: PreviewRequest, journal: Journal) -> Outcome:
+    """Make a page of files and write it."""
+    paths, output = find_files(request.files), request.output
+    inputs = [*paths, *request.reports, *request.figures]
+    check_output(output, inputs, request.force, PAGE_SUFFIXES)
+    previewed = preview_clips(
+        paths,
+        request.settings,
+        skel=request.skel,
+        reports=request.reports,
+        figures=request.figures,
+        title=request.title,
+        conventions=conventions_from(request.maps),
+    )
+    for note in previewed.notes:
+        journal.warn("preview", note)
+    write_preview(previewed, output, force=request.force, inputs=inputs)
+    size = output.stat().st_size
+    return Outcome(
+        request,
+        (*inputs, *request.maps),
+        lambda: preview_result(previewed.lanes, previewed.notes, size, output),
+        summary,
+        written=(output,),
+    )

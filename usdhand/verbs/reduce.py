@@ -1,69 +1,38 @@
-"""Method 1 on clips and files: reduce and expand."""
+"""Method 1 on clips and files: hands reduced to a rig."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from usdhand.anatomy import SIDES, Side
-from usdhand.errors import UsageError
-from usdhand.formats.files import read_any, reopened
+from usdhand.errors import OutputError, UsageError
+from usdhand.formats.files import read_clip, reopened
+from usdhand.formats.output import check_folder, check_outputs, make_folder
+from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.motion import Clip, Problem
-from usdhand.motion.resample import in_time_of
-from usdhand.reduce.fit import PRESETS, Fit, Thresholds
-from usdhand.reduce.method import Reduction, Target, apply_rig, fit_rig
-from usdhand.reduce.method import expand as expand_channels
+from usdhand.reduce.method import Reduction, apply_rig, fit_rig
 from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.settings import Fit, ReduceSettings
+from usdhand.report.plots import reducing as plotting
+from usdhand.report.plots.style import check_plots
+from usdhand.report.reduce import reduce_result, summary
+from usdhand.requests.reduce import ReduceRequest
+from usdhand.requests.shared import sides
 from usdhand.rigs import Conventions
-from usdhand.verbs.clips import find_hands
-
-
-def reduction_target(
-    preset: int | None = None,
-    range_deg: float | None = None,
-    rmsd: float | None = None,
-    free_channels: int | None = None,
-    max_error: float | None = None,
-) -> Target:
-    """Make a target from what was given; preset 4 if nothing was.
-
-    Raises
-    ------
-    UsageError
-        if more than one way is used, or a preset or threshold is out of range.
-    """
-    thresholds = None
-    if preset is not None and preset not in PRESETS:
-        raise UsageError(
-            f"There is no preset {preset}; presets are {', '.join(map(str, PRESETS))}."
-        )
-    if preset is not None and (range_deg is not None or rmsd is not None):
-        raise UsageError("A preset sets both thresholds; give a preset or thresholds, not both.")
-    if range_deg is not None or rmsd is not None:
-        thresholds = Thresholds(range_deg or 0.0, rmsd or 0.0)
-        if not (thresholds.range >= 0 and 0 <= thresholds.rmsd <= 2):
-            raise UsageError("Thresholds: a range of 0 degrees or more, an rmsd from 0 to 2.")
-    elif preset is not None:
-        thresholds = PRESETS[preset]
-    elif free_channels is None and max_error is None:
-        thresholds = PRESETS[4]
-    return Target(thresholds, free_channels, max_error)
+from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.verbs.files import find_files
+from usdhand.verbs.outcome import Journal, Outcome
 
 
 def reduce_hands(
     clips: Sequence[Clip],
+    settings: ReduceSettings | None = None,
     *,
-    preset: int | None = None,
-    range_deg: float | None = None,
-    rmsd: float | None = None,
-    free_channels: int | None = None,
-    max_error: float | None = None,
-    fit: Fit = "paper",
-    most_controllers: int = 1,
     rig: ReducedRig | None = None,
     conventions: Conventions | None = None,
     sides: Sequence[Side] = SIDES,
@@ -72,59 +41,37 @@ def reduce_hands(
 
     Parameters
     ----------
-    preset : 1 to 4, the paper's steps; or ``range_deg`` (degrees) and ``rmsd`` thresholds;
-        or ``free_channels``, how many shall stay; or ``max_error``, the largest RMS error of any
-        channel in degrees
-    fit : "paper" keeps standard deviations, "least-squares" has the least error
-    most_controllers : how many channels one may follow, with least squares
+    settings : how to fit
     rig : a fitted rig to apply as it is
 
     Returns
     -------
     list of Reduction, one a clip, all with the same rig.
+
+    Raises
+    ------
+    UsageError
+        if there is no clip, or the settings contradict each other.
+    HandNotFoundError
+        if a clip has no hands.
     """
+    settings = settings or ReduceSettings()
     if not clips:
         raise UsageError("There is no clip to reduce.")
-    if fit not in get_args(Fit):
-        raise UsageError(f"There is no fit '{fit}'; there are {' and '.join(get_args(Fit))}.")
+    if settings.fit not in get_args(Fit):
+        raise UsageError(
+            f"There is no fit '{settings.fit}'; there are {' and '.join(get_args(Fit))}."
+        )
     hands = [
         find_hands(clip, conventions, sides, [c for c in clips if _same_skeleton(c, clip)])
         for clip in clips
     ]
     sources = [h.encode(clip) for clip, h in zip(clips, hands, strict=True)]
     if rig is None:
-        target = reduction_target(preset, range_deg, rmsd, free_channels, max_error)
-        rig = fit_rig(clips, hands, target, fit, most_controllers, sources)
+        controllers = settings.controllers
+        rig = fit_rig(clips, hands, settings.target, settings.fit, controllers, sources)
     each = zip(clips, hands, sources, strict=True)
     return [apply_rig(rig, clip, h, source) for clip, h, source in each]
-
-
-def expand(
-    path: str | Path, conventions: Conventions | None = None, skel: str | None = None
-) -> Clip:
-    """Motion of a rig file: dependent channels computed from its free ones.
-
-    ``skel`` chooses a rig by its skeleton where the file has several.
-    """
-    stored = usd_rig.read_stored_rig(path, skel)
-    hands = usd_rig.with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
-    return expand_channels(stored.rig, stored.free, stored.clip, hands)
-
-
-def expand_onto(
-    path: str | Path,
-    target: str | Path,
-    skel: str | None = None,
-    conventions: Conventions | None = None,
-) -> Clip:
-    """Motion of a rig file's hands on another character, in the rig's time.
-
-    The body keeps the target's own motion, its ends held, or its bind pose where it has none.
-    """
-    stored = usd_rig.read_stored_rig(path)
-    body, _ = read_any(target, skel)
-    body = in_time_of(body, stored.clip)
-    return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
 
 
 def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
@@ -152,3 +99,81 @@ def _same_skeleton(a: Clip, b: Clip) -> bool:
     return a.skeleton.joints == b.skeleton.joints and np.allclose(
         a.skeleton.bind, b.skeleton.bind, atol=1e-4
     )
+
+
+def run(request: ReduceRequest, journal: Journal) -> Outcome:
+    """Fit one rig to all clips, or apply a fitted one, and write a rig over each clip."""
+    paths = find_files(request.clips)
+    outputs = _outputs(paths, request.output)
+    inputs = [*paths, *([request.rig] if request.rig else []), *request.maps]
+    _check_fitting(request)
+    _check_outputs(outputs, inputs, request.force)
+    if request.plots is not None:
+        check_plots(request.plots, plotting.NAMES, request.force)
+    conventions = conventions_from(request.maps)
+    rig = read_rig(request.rig) if request.rig else None
+    clips = [read_clip(path, request.skel) for path in journal.each(paths, "reading")]
+    for clip in clips:
+        journal.about(clip.origin.path, clip.problems, "warning")
+    reductions = reduce_hands(
+        clips, request.settings, rig=rig, conventions=conventions, sides=sides(request.side)
+    )
+    for reduction in reductions:
+        for note in reduction.hands.notes:
+            journal.warn("hands", note, reduction.clip.origin.path)
+    if not request.dry_run:
+        make_folder(outputs[0].parent)
+        pairs = list(zip(reductions, outputs, strict=True))
+        for reduction, target in journal.each(pairs, "writing"):
+            lost = write_rig(reduction, target, flatten=request.flatten, force=request.force)
+            journal.about(target, lost, "warning", "note")
+
+    def report() -> dict[str, Any]:
+        results = [
+            reduce_result(r) | {"output": None if request.dry_run else str(o)}
+            for r, o in zip(reductions, outputs, strict=True)
+        ]
+        return results[0] if len(results) == 1 else {"clips": results}
+
+    return Outcome(
+        request,
+        tuple(inputs),
+        report,
+        summary,
+        figures=lambda: plotting.figures(reductions),
+        written=() if request.dry_run else tuple(outputs),
+    )
+
+
+def _check_fitting(request: ReduceRequest) -> None:
+    given = request.settings
+    asked = {
+        "--preset": given.preset,
+        "--range": given.range_deg,
+        "--rmsd": given.rmsd,
+        "--target-dofs": given.free_channels,
+        "--max-error": given.max_error,
+    }
+    used = [flag for flag, value in asked.items() if value is not None]
+    if request.rig is not None and used:
+        raise UsageError(f"--rig applies a rig as it is; {used[0]} fits one.")
+    if request.rig is not None and (given.fit != "paper" or given.controllers > 1):
+        raise UsageError("--rig applies a rig as it is; --fit and --controllers are for fitting.")
+    _ = given.target  # refuses what contradicts itself before anything is read
+
+
+def _outputs(paths: Sequence[Path], output: Path) -> list[Path]:
+    """One output a clip: the file given, or files in the folder given."""
+    if len(paths) == 1 and not output.is_dir():
+        return [output]
+    return [output / f"{path.stem}.rig.usdc" for path in paths]
+
+
+def _check_outputs(outputs: Sequence[Path], inputs: Sequence[Path], force: bool) -> None:
+    if len(set(outputs)) < len(outputs):
+        raise OutputError("Two clips have the same name, so their rigs would replace each other.")
+    folder = outputs[0].parent
+    if len(outputs) > 1 and not folder.exists():  # made once there is something to put in
+        check_folder(folder)
+        return
+    check_outputs(outputs, inputs, force, USD_SUFFIXES)

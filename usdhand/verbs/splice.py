@@ -5,21 +5,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from usdhand.anatomy import SIDES, Side
-from usdhand.errors import UsageError
-from usdhand.formats.files import reopened
+from usdhand.errors import UsageError, UsdHandError
+from usdhand.formats.files import read_clip, reopened
+from usdhand.formats.output import check_output
+from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.warp import author_warps
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip, Problem
+from usdhand.report.plots import splicing as plotting
+from usdhand.report.plots.style import check_plots
+from usdhand.report.splice import splice_result, summary
+from usdhand.requests.shared import sides
+from usdhand.requests.splice import SpliceRequest
 from usdhand.rigs import Conventions
 from usdhand.splice.method import Spliced, splice
 from usdhand.splice.settings import Pin, SpliceSettings
-from usdhand.verbs.clips import find_hands
+from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.verbs.outcome import Journal, Outcome
 
-__all__ = ["parse_pin", "splice_hands", "write_spliced"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def splice_hands(
@@ -88,21 +98,18 @@ def write_spliced(
     *,
     flatten: bool = False,
     force: bool = False,
-    wrist: bool = False,
     conventions: Conventions | None = None,
     inputs: Sequence[Path] = (),
 ) -> tuple[Problem, ...]:
     """Write a spliced body as a layer over its file, with the warps as attributes of a Scope.
 
-    Parameters
-    ----------
-    wrist : whether the wrists have changed as well
+    The wrists are written too where they are the hand clip's.
     """
     clip = spliced.clip
     character = reopened(clip)
     hands = find_hands(clip, conventions, list(spliced.hands))
     changed = [j for frames in hands.frames.values() for j in frames.links.moving]
-    if wrist:
+    if spliced.settings.wrist == "hands":
         changed += [hands.character.hands[side].wrist for side in spliced.hands]
     return write_motion(
         character,
@@ -115,4 +122,60 @@ def write_spliced(
         author=author_warps(
             clip.time_codes.tolist(), {s: a.warp[:, 1].tolist() for s, a in spliced.hands.items()}
         ),
+    )
+
+
+def run(request: SpliceRequest, journal: Journal) -> Outcome:
+    """Splice a hand clip onto a body clip."""
+    body, hands, output = request.body, request.hands, request.output
+    check_output(output, [body, hands], request.force, USD_SUFFIXES)
+    if request.plots is not None:
+        check_plots(request.plots, plotting.NAMES, request.force)
+    conventions = conventions_from(request.maps)
+    clip = read_clip(body, request.skel)
+    try:
+        hand_clip = read_clip(hands, request.hands_skel)
+    except UsdHandError as error:
+        raise type(error)(str(error).replace("--skel", "--hands-skel")) from error
+    if body.resolve() == hands.resolve() and request.skel == request.hands_skel:
+        journal.warn("same-file", "body and hand clip are the same", body)
+    for read in (clip, hand_clip):
+        journal.about(read.origin.path, read.problems, "warning")
+    spliced = splice_hands(
+        clip,
+        hand_clip,
+        request.settings,
+        pins=request.pins,
+        sides=sides(request.side),
+        conventions=conventions,
+    )
+    for note in spliced.notes:
+        journal.warn("splice", note, f"{body} with {hands}")
+    if not request.dry_run:
+        lost = write_spliced(
+            spliced,
+            output,
+            flatten=request.flatten,
+            force=request.force,
+            conventions=conventions,
+            inputs=[hands],
+        )
+        journal.about(output, lost, "warning", "note")
+
+    def report() -> dict[str, Any]:
+        return splice_result(spliced) | {"output": None if request.dry_run else str(output)}
+
+    def figures() -> dict[str, Figure]:
+        ours = find_hands(clip, conventions, sides(request.side))
+        theirs = find_hands(hand_clip, conventions, sides(request.side))
+        return plotting.figures(spliced, clip, hand_clip, ours, theirs, request.settings)
+
+    return Outcome(
+        request,
+        (body, hands, *request.maps),
+        report,
+        summary,
+        settings={"pins": list(request.pins)},
+        figures=figures,
+        written=() if request.dry_run else (output,),
     )

@@ -10,7 +10,6 @@ from pxr import Sdf, Usd, UsdGeom, UsdValidation
 
 from usdhand.formats.usd.check_animation import animation_findings
 from usdhand.formats.usd.check_skeleton import skeleton_findings
-from usdhand.formats.usd.findings import Finding, Severity
 from usdhand.formats.usd.rig import rig_findings
 from usdhand.formats.usd.stage import (
     choose_skeleton,
@@ -19,14 +18,15 @@ from usdhand.formats.usd.stage import (
     open_stage,
     usd_diagnostics,
 )
+from usdhand.problems import Problem, Severity
 
-__all__ = ["Finding", "Severity", "check_file"]
+__all__ = ["Problem", "Severity", "check_file"]
 
 # Errors to UsdValidation that change no motion: USD assumes Y up and centimetres then.
 ONLY_WARNINGS = {"MissingMetersPerUnitMetadata", "MissingUpAxisMetadata"}
 
 
-def check_file(path: str | Path, skel: str | None = None) -> tuple[Finding, ...]:
+def check_file(path: str | Path, skel: str | None = None) -> tuple[Problem, ...]:
     """Check everything about a file that matters to the motion of its characters.
 
     Parameters
@@ -36,7 +36,7 @@ def check_file(path: str | Path, skel: str | None = None) -> tuple[Finding, ...]
 
     Returns
     -------
-    tuple of Finding
+    tuple of Problem
         errors first; empty for a file that is right.
 
     Raises
@@ -53,20 +53,20 @@ def check_file(path: str | Path, skel: str | None = None) -> tuple[Finding, ...]
     return tuple(sorted(found, key=lambda finding: finding.severity != "error"))
 
 
-def _stage_findings(path: Path, stage: Usd.Stage, skel: str | None) -> Iterator[Finding]:
+def _stage_findings(path: Path, stage: Usd.Stage, skel: str | None) -> Iterator[Problem]:
     yield from validator_findings(stage)
     yield from unit_findings(stage)
     yield from rate_findings(stage)
     yield from rig_findings(stage, path)
     skeletons = find_skeletons(stage)
     if not skeletons:
-        yield Finding("warning", "no-skeleton", "there is no UsdSkel skeleton", str(path))
+        yield Problem("no-skeleton", "there is no UsdSkel skeleton", str(path), "warning")
     for skeleton in [choose_skeleton(path, skeletons, skel)] if skel else skeletons:
         yield from skeleton_findings(skeleton)
         yield from animation_findings(skeleton)
 
 
-def validator_findings(stage: Usd.Stage) -> Iterator[Finding]:
+def validator_findings(stage: Usd.Stage) -> Iterator[Problem]:
     """Run all validators that this USD has."""
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     for error in UsdValidation.ValidationContext(validators).Validate(stage):
@@ -75,10 +75,10 @@ def validator_findings(stage: Usd.Stage) -> Iterator[Finding]:
             "error" if fatal and error.GetName() not in ONLY_WARNINGS else "warning"
         )
         where = ", ".join(_site_name(site) for site in error.GetSites())
-        yield Finding(severity, str(error.GetIdentifier()), error.GetMessage(), where)
+        yield Problem(str(error.GetIdentifier()), error.GetMessage(), where, severity)
 
 
-def unit_findings(stage: Usd.Stage) -> Iterator[Finding]:
+def unit_findings(stage: Usd.Stage) -> Iterator[Problem]:
     """Stage metadata that can be no unit or rate."""
     for name, value in (
         ("timeCodesPerSecond", stage.GetTimeCodesPerSecond()),
@@ -86,10 +86,10 @@ def unit_findings(stage: Usd.Stage) -> Iterator[Finding]:
     ):
         if not 0.0 < value < np.inf:
             where = stage.GetRootLayer().identifier
-            yield Finding("error", "bad-unit", f"{name} is {value:g}: it must be above 0", where)
+            yield Problem("bad-unit", f"{name} is {value:g}: it must be above 0", where, "error")
 
 
-def rate_findings(stage: Usd.Stage) -> Iterator[Finding]:
+def rate_findings(stage: Usd.Stage) -> Iterator[Problem]:
     """Layers whose time codes USD rescales since they count another number to a second.
 
     That is right where both say what they count. A layer that does not is taken to count 24.
@@ -106,12 +106,12 @@ def rate_findings(stage: Usd.Stage) -> Iterator[Finding]:
             if silent
             else "this is right if it is meant"
         )
-        yield Finding(
-            "error" if silent else "warning",
+        yield Problem(
             "time-rescaled",
             f"time codes of a layer with {own:g} a second are rescaled to the stage's {rate:g}: "
             f"{advice}",
             layer.identifier,
+            "error" if silent else "warning",
         )
 
 

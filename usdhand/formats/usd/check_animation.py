@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdSkel
 
 from usdhand.formats.usd.check_skeleton import some
-from usdhand.formats.usd.findings import Finding, Severity
 from usdhand.formats.usd.stage import binding_prim
 from usdhand.motion import leaf_name
+from usdhand.problems import Problem, Severity
 
 UNIT_TOLERANCE = 1e-3
 TIME_TOLERANCE = 1e-6  # time codes
 
 
-def animation_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
+def animation_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
     """Everything that is wrong with the animation that a skeleton is bound to."""
     yield from _binding_findings(skeleton)
     source = UsdSkel.BindingAPI(skeleton).GetInheritedAnimationSource()
@@ -30,80 +30,80 @@ def animation_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
     yield from _value_findings(source)
 
 
-def _binding_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
+def _binding_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
     owner = binding_prim(skeleton)
     targets = UsdSkel.BindingAPI(owner).GetAnimationSourceRel().GetTargets()
     where = str(owner.GetPath())
     if not targets:
-        yield Finding("warning", "no-animation", "no animation is bound to the skeleton", where)
+        yield Problem("no-animation", "no animation is bound to the skeleton", where, "warning")
     elif not (bound := skeleton.GetStage().GetPrimAtPath(targets[0])):
-        yield Finding("error", "no-such-animation", f"{targets[0]} is bound, but not there", where)
+        yield Problem("no-such-animation", f"{targets[0]} is bound, but not there", where, "error")
     elif not bound.IsA(UsdSkel.Animation):
-        yield Finding(
-            "error", "no-such-animation", f"{targets[0]} is bound, but no SkelAnimation", where
+        yield Problem(
+            "no-such-animation", f"{targets[0]} is bound, but no SkelAnimation", where, "error"
         )
     prim = owner.GetParent()
     while prim and not prim.IsPseudoRoot():
         overruled = UsdSkel.BindingAPI(prim).GetAnimationSourceRel()
         if overruled and overruled.GetTargets() not in ([], targets):
-            yield Finding(
-                "warning",
+            yield Problem(
                 "lost-binding",
                 f"binds {overruled.GetTargets()[0]}, but the binding on {where} below wins: "
                 "override it there",
                 str(prim.GetPath()),
+                "warning",
             )
         prim = prim.GetParent()
 
 
-def _joint_findings(skeleton: Usd.Prim, source: Usd.Prim) -> Iterator[Finding]:
+def _joint_findings(skeleton: Usd.Prim, source: Usd.Prim) -> Iterator[Problem]:
     where = str(source.GetPath())
     known = {str(joint) for joint in UsdSkel.Skeleton(skeleton).GetJointsAttr().Get() or ()}
     listed = [str(joint) for joint in UsdSkel.Animation(source).GetJointsAttr().Get() or ()]
     unknown = [joint for joint in listed if joint not in known]
     if len(unknown) == len(listed):
-        yield Finding(
-            "error",
+        yield Problem(
             "no-joints-animated",
             f"it animates no joint of {skeleton.GetPath()}; it lists {some(listed) or 'none'}",
             where,
+            "error",
         )
     elif unknown:
-        yield Finding(
-            "warning",
+        yield Problem(
             "unknown-joints",
             f"{len(unknown)} animated joints are not in {skeleton.GetPath()}: {some(unknown)}",
             where,
+            "warning",
         )
 
 
-def _time_findings(source: Usd.Prim) -> Iterator[Finding]:
+def _time_findings(source: Usd.Prim) -> Iterator[Problem]:
     stage, where = source.GetStage(), str(source.GetPath())
     times = UsdSkel.Animation(source).GetRotationsAttr().GetTimeSamples()
     if not times:
-        yield Finding(
-            "warning",
+        yield Problem(
             "static-rotations",
             "the rotations have no time samples: Blender shows the rest pose",
             where,
+            "warning",
         )
         return
     start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
     root = stage.GetRootLayer()
     if not (root.HasStartTimeCode() and root.HasEndTimeCode()):
-        yield Finding(
-            "warning",
+        yield Problem(
             "no-time-range",
             f"the stage has no start or end; the animation has {times[0]:g} to {times[-1]:g}",
             root.identifier,
+            "warning",
         )
     elif times[0] < start - TIME_TOLERANCE or times[-1] > end + TIME_TOLERANCE:
-        yield Finding(
-            "warning",
+        yield Problem(
             "time-range",
             f"the stage plays {start:g} to {end:g}, the animation has {times[0]:g} to "
             f"{times[-1]:g}",
             where,
+            "warning",
         )
 
 
@@ -123,7 +123,7 @@ class SampledAttribute:
         return f"at {first}" + (f" and {len(rows) - 1} more" if len(rows) > 1 else "")
 
 
-def _value_findings(source: Usd.Prim) -> Iterator[Finding]:
+def _value_findings(source: Usd.Prim) -> Iterator[Problem]:
     animation = UsdSkel.Animation(source)
     joints = [leaf_name(str(joint)) for joint in animation.GetJointsAttr().Get() or ()]
     for attribute in (
@@ -132,12 +132,12 @@ def _value_findings(source: Usd.Prim) -> Iterator[Finding]:
         animation.GetScalesAttr(),
     ):
         if not attribute.HasAuthoredValue():
-            yield Finding(
-                "error",
+            yield Problem(
                 f"missing-{attribute.GetName()}",
                 f"there are no {attribute.GetName()}: without all three of rotations, "
                 "translations and scales UsdSkel shows the rest pose",
                 str(source.GetPath()),
+                "error",
             )
             continue
         times = attribute.GetTimeSamples()
@@ -146,15 +146,15 @@ def _value_findings(source: Usd.Prim) -> Iterator[Finding]:
         yield from _track_findings(SampledAttribute(str(attribute.GetPath()), joints, times, rows))
 
 
-def _track_findings(track: SampledAttribute) -> Iterator[Finding]:
+def _track_findings(track: SampledAttribute) -> Iterator[Problem]:
     blocked = [i for i, row in enumerate(track.rows) if row is None]
     if blocked:
-        yield Finding("error", "blocked-sample", f"blocked {track.at(blocked)}", track.path)
+        yield Problem("blocked-sample", f"blocked {track.at(blocked)}", track.path, "error")
     count = len(track.joints)
     wrong = [i for i, row in enumerate(track.rows) if row is not None and len(row) != count]
     if wrong:
         message = f"{len(track.rows[wrong[0]])} values for {count} joints {track.at(wrong)}"
-        yield Finding("error", "array-length", message, track.path)
+        yield Problem("array-length", message, track.path, "error")
     whole = [i for i, row in enumerate(track.rows) if row is not None and len(row) == count]
     if not whole or not count:
         return
@@ -163,8 +163,8 @@ def _track_findings(track: SampledAttribute) -> Iterator[Finding]:
         if bad.any():
             names = [track.joints[int(j)] for j in np.flatnonzero(bad.any(axis=0))]
             frames = [whole[int(i)] for i in np.flatnonzero(bad.any(axis=1))]
-            yield Finding(
-                severity, code, f"{message}: {some(names)} {track.at(frames)}", track.path
+            yield Problem(
+                code, f"{message}: {some(names)} {track.at(frames)}", track.path, severity
             )
 
 

@@ -9,70 +9,70 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd, UsdGeom, UsdSkel
 
-from usdhand.formats.usd.findings import Finding, Severity
 from usdhand.formats.usd.names import illegal_names, legal_name
 from usdhand.formats.usd.poses import MISPLACED_BIND_CM
 from usdhand.formats.usd.world import world_problems
 from usdhand.motion import leaf_name, parents_from_paths
+from usdhand.problems import Problem, Severity
 
 SHOWN = 3  # examples in one message
 
 
-def skeleton_findings(skeleton: Usd.Prim) -> Iterator[Finding]:
+def skeleton_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
     """Everything that is wrong with a skeleton itself."""
     where = str(skeleton.GetPath())
     tokens = UsdSkel.Skeleton(skeleton).GetJointsAttr().Get()
     joints = [str(token) for token in tokens or ()]
     if not joints:
-        yield Finding("error", "no-joints", "the skeleton lists no joints", where)
+        yield Problem("no-joints", "the skeleton lists no joints", where, "error")
         return
     yield from _name_findings(joints, where)
     yield from _order_findings(joints, where)
     yield from _pose_findings(skeleton, joints, where)
     for problem in world_problems(skeleton):
         severity: Severity = "error" if problem.code == "zero-scale" else "warning"
-        yield Finding(severity, problem.code, problem.message, problem.where)
+        yield Problem(problem.code, problem.message, problem.where, severity)
 
 
-def _name_findings(joints: Sequence[str], where: str) -> Iterator[Finding]:
+def _name_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
     illegal = illegal_names(joints)
     if illegal:
         renamed = [f"'{name}' to '{legal_name(name)}'" for name in illegal]
-        yield Finding(
-            "error",
+        yield Problem(
             "illegal-joint-name",
             f"{len(illegal)} joint names are no legal prim names: USD then sees no hierarchy and "
             f"Blender makes no bones. Rename {some(renamed)}",
             where,
+            "error",
         )
     double = [joint for joint, count in Counter(joints).items() if count > 1]
     if double:
-        yield Finding("error", "duplicate-joint", f"listed twice: {some(double)}", where)
+        yield Problem("duplicate-joint", f"listed twice: {some(double)}", where, "error")
     shared = [n for n, count in Counter(map(leaf_name, set(joints))).items() if count > 1]
     if shared:
-        yield Finding(
-            "warning",
+        yield Problem(
             "duplicate-joint-name",
             f"{len(shared)} names belong to several joints, which tools that drop the hierarchy "
             f"confuse: {some(shared)}",
             where,
+            "warning",
         )
 
 
-def _order_findings(joints: Sequence[str], where: str) -> Iterator[Finding]:
+def _order_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
     parents = parents_from_paths(joints)
     late = [joints[int(j)] for j in np.flatnonzero(parents > np.arange(len(joints)))]
     if late:
-        yield Finding(
-            "error",
+        yield Problem(
             "joint-order",
             f"{len(late)} joints are listed before their parents, so UsdSkel refuses the "
             f"skeleton: {some(late)}",
             where,
+            "error",
         )
 
 
-def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Iterator[Finding]:
+def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Iterator[Problem]:
     api = UsdSkel.Skeleton(skeleton)
     poses: dict[str, NDArray[np.float64]] = {}
     for name, attribute in (
@@ -81,25 +81,25 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
     ):
         matrices = np.array(attribute.Get() or [], dtype=np.float64).reshape(-1, 4, 4)
         if not len(matrices):
-            yield Finding(
-                "error",
+            yield Problem(
                 f"missing-{name}",
                 f"there are no {name} transforms, without which UsdSkel and Blender cannot pose it",
                 where,
+                "error",
             )
         elif len(matrices) != len(joints):
-            yield Finding(
-                "error",
+            yield Problem(
                 f"{name}-length",
                 f"{len(matrices)} {name} transforms for {len(joints)} joints",
                 where,
+                "error",
             )
         elif bad := [joints[int(j)] for j in np.flatnonzero(~_usable(matrices))]:
-            yield Finding(
-                "error",
+            yield Problem(
                 f"bad-{name}",
                 f"{len(bad)} {name} transforms are singular or no numbers: {some(bad)}",
                 where,
+                "error",
             )
         else:
             poses[name] = matrices
@@ -108,12 +108,12 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
         offsets = _first_offsets(skeleton, joints, poses["rest"][:, 3, :3])
         unplaced = _unplaced(poses["bind"], offsets, parents_from_paths(joints), cm)
         if len(unplaced):
-            yield Finding(
-                "warning",
+            yield Problem(
                 "identity-bind",
                 f"{len(unplaced)} joints have an identity bind transform (Maya writes that where "
                 f"no skin uses a joint): {some([leaf_name(joints[j]) for j in unplaced])}",
                 where,
+                "warning",
             )
 
 

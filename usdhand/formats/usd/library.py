@@ -20,7 +20,6 @@ from usdhand.errors import InputError, UsageError, UsdHandError
 from usdhand.fill.library import (
     ARM_FPS,
     ARM_WIDTH,
-    Left,
     LibraryClip,
     LibraryHand,
     MotionLibrary,
@@ -33,6 +32,7 @@ from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.stage import open_stage, usd_diagnostics
 from usdhand.formats.usd.write import save_layer
+from usdhand.problems import Problem
 
 VERSION = 1
 ROOT = "/Library"
@@ -76,7 +76,7 @@ def write_library(library: MotionLibrary, output: Path, *, force: bool = False) 
             _prim(layer, LEFT_OUT, "Scope")
         for number, left in enumerate(library.left_out):
             prim = _prim(layer, f"{LEFT_OUT}/Clip{number}", "Scope")
-            values = {"path": (_TYPES.String, left.path), "reason": (_TYPES.String, left.reason)}
+            values = {"path": (_TYPES.String, left.file), "reason": (_TYPES.String, left.message)}
             _set_all(prim, values)
     save_layer(layer, output, flatten=False)
 
@@ -117,22 +117,22 @@ def read_library(path: str | Path) -> MotionLibrary:
             f"'usdhand library build CLIP... -o {path} --rebuild' makes it anew."
         )
     clips: list[LibraryClip] = []
-    damaged: list[Left] = []
+    damaged: list[Problem] = []
     parent = stage.GetPrimAtPath(CLIPS)
     for prim in parent.GetChildren() if parent else ():
         try:
             clips.append(_read_clip(prim))
         except _DamagedError as error:
-            damaged.append(Left(str(prim.GetPath()), str(error)))
+            damaged.append(Problem("damaged", str(error), file=str(prim.GetPath())))
     if damaged and not clips:
         raise InputError(
-            f"{path}: none of its {len(damaged)} clips can be used ({damaged[0].path}: "
-            f"{damaged[0].reason}); "
+            f"{path}: none of its {len(damaged)} clips can be used ({damaged[0].file}: "
+            f"{damaged[0].message}); "
             f"'usdhand library build CLIP... -o {path} --rebuild' makes it anew."
         )
     left = stage.GetPrimAtPath(LEFT_OUT)
     left_out = [
-        Left(str(_get(p, "path", "")), str(_get(p, "reason", "")))
+        Problem("left-out", str(_get(p, "reason", "")), file=str(_get(p, "path", "")))
         for p in (left.GetChildren() if left else ())
     ]
     ordered = tuple(sorted(clips, key=lambda c: c.name))

@@ -14,7 +14,6 @@ from usdhand.anatomy.channels import Channels, Hands
 from usdhand.anatomy.frames import HandFrames
 from usdhand.anatomy.hand import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError
-from usdhand.formats.usd.findings import Finding
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, VERSION, author_rig
 from usdhand.formats.usd.stage import (
@@ -24,8 +23,9 @@ from usdhand.formats.usd.stage import (
     open_stage,
 )
 from usdhand.formats.usd.write import free_child, write_motion
-from usdhand.motion import Clip, Problem
+from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
+from usdhand.problems import Problem
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.rig import Kind, ReducedRig, Relation, evaluation_order
 
@@ -167,16 +167,16 @@ def rig_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     return (prim for prim in everything if prim.GetAttribute("usdhand:version").HasAuthoredValue())
 
 
-def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Finding]:
+def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Problem]:
     """What is wrong with the rigs of a stage; see `usdhand.formats.usd.check.check_file`."""
     seen: dict[str | None, str] = {}
     for prim in rig_prims(stage):
         where, skeleton = str(prim.GetPath()), _skeleton_path(prim)
         if skeleton is None:
-            yield Finding("error", "rig-skeleton", "the rig's skeleton is not on the stage", where)
+            yield Problem("rig-skeleton", "the rig's skeleton is not on the stage", where, "error")
         elif skeleton in seen:
             message = f"{seen[skeleton]} is a rig of the same skeleton: one must be deactivated"
-            yield Finding("error", "second-rig", message, where)
+            yield Problem("second-rig", message, where, "error")
         seen[skeleton] = where
         try:
             rig = _relations(prim, path)
@@ -184,7 +184,7 @@ def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Finding]:
             for name in rig.free:
                 _curve(prim, name, np.zeros(1), path)
         except InputError as error:
-            yield Finding("error", "broken-rig", str(error), where)
+            yield Problem("broken-rig", str(error), where, "error")
 
 
 def _relations(prim: Usd.Prim, path: Path) -> ReducedRig:

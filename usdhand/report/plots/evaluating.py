@@ -9,7 +9,7 @@ import numpy as np
 
 from usdhand.evaluate.agreement import Agreement
 from usdhand.evaluate.reconstruction import METHODS, HandError
-from usdhand.report.filling import evaluation_result
+from usdhand.report.evaluate import evaluation_result
 from usdhand.report.plots import style
 from usdhand.report.plots.style import BLACK, BLUE, GREY, ORANGE, SKY, YELLOW, styled
 

@@ -12,10 +12,11 @@ import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.reduce.errors import pca_rms
-from usdhand.reduce.fit import Fit, Statistics
+from usdhand.reduce.fit import Statistics
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.rig import Relation
 from usdhand.reduce.search import errors_by_count
+from usdhand.reduce.settings import Fit
 from usdhand.report.plots import style
 from usdhand.report.plots.style import BLACK, BLUE, GREY, LIGHT, ORANGE, SKY, styled
 

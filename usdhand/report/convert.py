@@ -1,14 +1,14 @@
-"""What `convert` reports of one file."""
+"""What `convert` reports of a file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Problem
 from usdhand.report.document import rounded
-from usdhand.report.results import problems_data
+from usdhand.report.text import problems_data, written_to
 from usdhand.rigs import Conventions, map_character
 
 
@@ -39,6 +39,29 @@ def convert_result(
         "problems": problems_data(source.problems),
         "lost": problems_data(lost),
     }
+
+
+def summary(result: Mapping[str, Any], verbose: bool) -> str:
+    """What was read, guessed and written of each file."""
+    del verbose
+    return "\n".join(_text(file) for file in result["files"] if "error" not in file)
+
+
+def _text(result: Mapping[str, Any]) -> str:
+    motion = (
+        f"{result['frames']} frames at {result['fps']:g} fps from time code {result['start']:g}"
+        if result["animated"]
+        else "no motion, the bind pose"
+    )
+    hands = f"hands by convention '{result['convention']}'" if result["convention"] else "no hands"
+    lines = [f"{result['path']}: {result['joints']} joints, {motion}; {hands}"]
+    notes = [p for p in result["problems"] if p["code"].startswith("guessed")] + result["lost"]
+    lines += [f"  {note['message']}" for note in notes if note["severity"] == "note"]
+    if result["renamed_joints"]:
+        lines.append(
+            f"  {result['renamed_joints']} joints have other names in USD than in the file"
+        )
+    return "\n".join([*lines, f"  {written_to(result)}"])
 
 
 def _renamed(clip: Clip) -> int:

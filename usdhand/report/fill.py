@@ -1,59 +1,23 @@
-"""What library, fill and evaluate report, as plain data."""
+"""What `fill` reports."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from usdhand.anatomy import SIDES, Side
+from usdhand.anatomy import Side
 from usdhand.anatomy.hand import SIDE_PREFIX
-from usdhand.evaluate.agreement import Agreement
-from usdhand.evaluate.reconstruction import METHODS, HandError
 from usdhand.fill.candidates import Candidate, SearchSpace
 from usdhand.fill.library import ARM_FPS, MotionLibrary
 from usdhand.fill.results import Alternative, Choice, Filled, FilledPart
 from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
+from usdhand.problems import counted
 from usdhand.report.document import rounded
-
-LISTED = 3  # names that a message shows before it says "and N more"
-
-
-def counted(count: int, noun: str) -> str:
-    """Say a number and what it counts: 1 clip, 2 clips."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def listed(names: Sequence[str]) -> str:
-    """Show the first few names, and how many more there are."""
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    return ", ".join(names[:LISTED]) + more
-
-
-def library_result(library: MotionLibrary, gone: Sequence[str] = ()) -> dict[str, Any]:
-    """Everything `library info` shows; ``gone`` are clips whose file is not there."""
-    labels = sorted({c.label for c in library.clips if c.label})
-    cutting = library.segmentation
-    return {
-        "clips": len(library.clips),
-        "minutes": rounded(library.minutes),
-        "actors": sorted({c.actor for c in library.clips if c.actor}),
-        "labels": {x: sum(c.label == x for c in library.clips) for x in labels},
-        "segments": {
-            s: sum(len(c.hands[s].segments) for c in library.clips if s in c.hands) for s in SIDES
-        },
-        "segmentation": {
-            "speed_cm_s": cutting.speed,
-            "shortest_s": cutting.shortest,
-            "longest_s": cutting.longest,
-        },
-        "left_out": [{"path": x.path, "reason": x.reason} for x in library.left_out],
-        "damaged": [{"path": x.path, "reason": x.reason} for x in library.damaged],
-        "gone": list(gone),
-    }
+from usdhand.report.text import written_to
 
 
 def fill_result(filled: Filled, library: MotionLibrary, body: Clip) -> dict[str, Any]:
@@ -83,6 +47,32 @@ def fill_result(filled: Filled, library: MotionLibrary, body: Clip) -> dict[str,
     }
 
 
+def summary(result: Mapping[str, Any], verbose: bool) -> str:
+    """A line a hand, the costs of alternatives, and every segment if ``verbose``."""
+    lines = []
+    for side, paths in result.get("added_joints", {}).items():
+        lines.append(f"{side} hand: {len(paths)} joints added, as of {result['fingers_from']}")
+    for side, hand in result["hands"].items():
+        clips = {s["clip"] for s in hand["segments"]}
+        seams = hand["seams"]
+        lines.append(
+            f"{side} hand: {counted(len(hand['segments']), 'segment')} from "
+            f"{counted(len(clips), 'clip')}; largest "
+            f"angular acceleration {seams['max_acceleration_deg_s2']:.0f} deg/s^2 at the seams, "
+            f"{seams['max_acceleration_elsewhere_deg_s2']:.0f} elsewhere, "
+            f"{seams['max_acceleration_captured_deg_s2']:.0f} in the library"
+        )
+        for s in hand["segments"] if verbose else ():
+            lines.append(
+                f"  {s['start']:7.2f} to {s['end']:7.2f} s: {s['clip']} "
+                f"{s['clip_start']:.2f} to {s['clip_end']:.2f} s, cost {s['cost']:.1f}"
+            )
+    if len(result["alternatives"]) > 1:
+        costs = ", ".join(f"{a['cost']:.3f}" for a in result["alternatives"])
+        lines.append(f"{len(result['alternatives'])} alternatives, costs {costs}")
+    return "\n".join([*lines, written_to(result)])
+
+
 def _alternative_data(
     filled: Filled, number: int, library: MotionLibrary, fps: float
 ) -> dict[str, Any]:
@@ -104,54 +94,6 @@ def _alternative_data(
             }
             for side, space, own in hands
         },
-    }
-
-
-def evaluation_result(
-    agreements: Sequence[Agreement], errors: Sequence[HandError]
-) -> dict[str, Any]:
-    """Everything `evaluate` reports; the confusion matrix is that of the best metric."""
-    result: dict[str, Any] = {}
-    if agreements:
-        best = max(agreements, key=lambda a: a.share)
-        result["label_agreement"] = {
-            "segments": best.segments,
-            "metrics": [{"name": a.metric, "share": rounded(a.share)} for a in agreements],
-            "best": best.metric,
-            "labels": list(best.labels),
-            "confusion": [[rounded(x) for x in row] for row in best.confusion],
-        }
-    if errors:
-        result["reconstruction"] = {
-            side: {method: _mean_error(errors, side, method) for method in METHODS}
-            for side in sorted({e.side for e in errors})
-        }
-        result["takes"] = [
-            {
-                "take": e.take,
-                "side": e.side,
-                "method": e.method,
-                "degrees": rounded(e.degrees),
-                "fingertip_mm": rounded(e.fingertip_mm),
-                "jerk": rounded(e.jerk),
-            }
-            for e in errors
-        ]
-    return result
-
-
-def _mean_error(errors: Sequence[HandError], side: str, method: str) -> dict[str, float]:
-    """Means over all frames of all takes."""
-    own = [e for e in errors if e.side == side and e.method == method]
-    weights = [e.frames for e in own]
-
-    def mean(values: list[float]) -> float:
-        return rounded(np.average(values, weights=weights))
-
-    return {
-        "degrees": mean([e.degrees for e in own]),
-        "fingertip_mm": mean([e.fingertip_mm for e in own]),
-        "jerk": mean([e.jerk for e in own]),
     }
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from usdhand.motion import Clip
 from usdhand.report.document import rounded
+from usdhand.report.text import written_to
 from usdhand.splice.method import Alignment, Spliced
 from usdhand.splice.settings import Pin
 
@@ -19,6 +21,26 @@ def splice_result(spliced: Spliced) -> dict[str, Any]:
         "fps": rounded(body.fps),
         "frames": len(body),
     }
+
+
+def summary(result: Mapping[str, Any], verbose: bool) -> str:
+    """A line a hand, where to look, and every phase if ``verbose``."""
+    lines = []
+    for side, hand in result["hands"].items():
+        measured = hand["measured_from"]
+        follows = f", follows the {hand['taken_from']} one" if hand["taken_from"] else ""
+        lines.append(
+            f"{side} hand: {len(hand['channels'])} channels, {len(hand['phases'])} phases, the "
+            f"second pass moved them by {1000 * hand['pass_lag']:.0f} ms; measured from "
+            f"{measured['body']} and {measured['hands']}{follows}"
+        )
+        if hand["look_at"]:
+            frames = ", ".join(f"{frame:g}" for frame in hand["look_at"])
+            lines.append(f"  low agreement, consider a --pin, near time codes {frames}")
+        for p in hand["phases"] if verbose else ():
+            quality = "holds" if p["quality"] is None else f"agreement {p['quality']:.2f}"
+            lines.append(f"  {p['start']:7.2f} to {p['end']:7.2f} s: {quality}")
+    return "\n".join([*lines, written_to(result)])
 
 
 def _hand_data(alignment: Alignment, body: Clip) -> dict[str, Any]:

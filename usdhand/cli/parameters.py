@@ -1,0 +1,93 @@
+"""Options of requests as parameters of click, and the request of what was given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, replace
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+import click
+from click.core import ParameterSource
+
+from usdhand.options import Declared, alternatives, declared, flat
+from usdhand.requests.base import Request
+from usdhand.requests.codec import base_of
+
+
+def parameters(owner: type[Request]) -> list[click.Parameter]:
+    """All options and arguments of a request, in the order of its fields."""
+    return [_parameter(own, inside) for own, inside in flat(owner)]
+
+
+def request_of(owner: type[Request], context: click.Context) -> Request:
+    """Make the request of what was given on the command line.
+
+    Of settings, what was not given is as the option that chooses between them says.
+    """
+    values = context.params
+    made: dict[str, Any] = {}
+    for own in declared(owner):
+        if own.option.role != "settings":
+            made[own.name] = values[own.name]
+            continue
+        inner = {d.name: _name(d, own) for d in declared(own.type)}
+        given = {n: values[p] for n, p in inner.items() if _given(context, p)}
+        made[own.name] = replace(base_of(own, values.get(own.option.chosen_by)), **given)
+    return owner(**made)
+
+
+def _given(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is not ParameterSource.DEFAULT
+
+
+def _name(own: Declared, inside: Declared | None) -> str:
+    return own.name if inside is None else f"{inside.name}_{own.name}"
+
+
+def _parameter(own: Declared, inside: Declared | None) -> click.Parameter:
+    kind = alternatives(own.type)[0]
+    many = get_origin(kind) is tuple and get_args(kind)[1:] == (...,)
+    details: dict[str, Any] = {"type": _type(own, get_args(kind)[0] if many else kind)}
+    if own.option.read is not None:
+        details["callback"] = _reader(own.option.read)
+    if own.option.metavar:
+        details["metavar"] = own.option.metavar
+    if own.option.role == "argument":
+        return click.Argument([own.name], nargs=-1 if many else 1, required=True, **details)
+    if kind is bool:
+        details = {"is_flag": True}
+    elif many:
+        details["multiple"] = True
+    elif own.option.read is not None:
+        details |= {"default": own.option.shown or None, "show_default": bool(own.option.shown)}
+    elif own.default is not MISSING:
+        details |= {"default": own.default, "show_default": own.default is not None}
+    name = _name(own, inside)
+    return click.Option([name, *own.flags], required=own.required, help=own.option.help, **details)
+
+
+def _type(own: Declared, kind: Any) -> click.ParamType[Any]:
+    if own.option.read is not None:
+        return click.STRING
+    if get_origin(kind) is Literal:
+        return click.Choice([str(choice) for choice in get_args(kind)])
+    least, most = own.option.at_least, own.option.at_most
+    if kind is int and (least, most) != (None, None):
+        return click.IntRange(least, most)
+    if kind is Path:
+        return click.Path(path_type=Path)
+    simple: Mapping[type, click.ParamType[Any]] = {float: click.FLOAT, int: click.INT}
+    return simple.get(kind, click.STRING)
+
+
+def _reader(read: Callable[[str], Any]) -> Callable[..., Any]:
+    def callback(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return read(value)
+        except ValueError as error:
+            raise click.BadParameter(str(error), context, parameter) from error
+
+    return callback

@@ -1,0 +1,146 @@
+"""Options: what a person may set, declared once as the field of a frozen dataclass.
+
+The field's type, default and `Option` serve the command line, environment variables, JSON, its
+schema and the docs alike. Standard library only: a verb's options are known before numpy is loaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
+from functools import cache
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+Role = Literal["argument", "option", "settings"]
+
+
+@dataclass(frozen=True)
+class Option:
+    """How one field is set.
+
+    Attributes
+    ----------
+    help : a sentence or two for people
+    role : "argument" has its place on the command line, "settings" is a dataclass of options
+    flags : names on the command line; ``--`` and the field's name where empty
+    metavar : what stands for the value in help
+    key : its name in reports; the field's name where empty
+    at_least, at_most : smallest and largest number allowed
+    read : turns a text of the command line into the value; raises ValueError
+    shown : text that ``read`` makes the default of
+    bases : of settings: the value of ``chosen_by`` -> the settings that single options change
+    chosen_by : field that names one of ``bases``
+    reported : whether it is among the settings of a report
+    written : whether it names something that a run writes
+    """
+
+    help: str
+    role: Role = "option"
+    flags: tuple[str, ...] = ()
+    metavar: str = ""
+    key: str = ""
+    at_least: int | None = None
+    at_most: int | None = None
+    read: Callable[[str], Any] | None = None
+    shown: str = ""
+    bases: Mapping[str, Any] | None = None
+    chosen_by: str = ""
+    reported: bool = True
+    written: bool = False
+
+
+@dataclass(frozen=True)
+class Declared:
+    """An option with the name, type and default of its field."""
+
+    name: str
+    type: Any
+    default: Any  # MISSING where a value is needed
+    option: Option
+
+    @property
+    def key(self) -> str:
+        """Its name in reports."""
+        return self.option.key or self.name
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Its names on the command line."""
+        return self.option.flags or ("--" + self.name.replace("_", "-"),)
+
+    @property
+    def required(self) -> bool:
+        """Whether there is no default."""
+        return self.default is MISSING
+
+
+def argument(help: str, *, metavar: str = "", read: Callable[[str], Any] | None = None) -> Any:  # noqa: A002
+    """Declare a field that has its place on the command line, not a flag."""
+    own = Option(help, role="argument", metavar=metavar, read=read, reported=False)
+    return field(metadata={"option": own})
+
+
+def option(
+    help: str,  # noqa: A002
+    *flags: str,
+    default: Any = MISSING,
+    **details: Any,
+) -> Any:
+    """Declare a field that a flag sets; ``details`` are those of `Option`."""
+    return field(default=default, metadata={"option": Option(help, flags=flags, **details)})
+
+
+def settings(
+    default: Any, *, bases: Mapping[str, Any] | None = None, chosen_by: str = "", key: str = ""
+) -> Any:
+    """Declare a field that holds a dataclass of options."""
+    own = Option("", role="settings", bases=bases, chosen_by=chosen_by, key=key)
+    return field(default=default, metadata={"option": own})
+
+
+def declared(owner: type) -> tuple[Declared, ...]:
+    """Options of a dataclass in the order of its fields, those of its settings not among them."""
+    return tuple(_declared(owner))
+
+
+@cache
+def _declared(owner: type) -> tuple[Declared, ...]:
+    hints = get_type_hints(owner)
+    return tuple(
+        Declared(f.name, hints[f.name], _default(f), f.metadata["option"])
+        for f in fields(owner)
+        if "option" in f.metadata
+    )
+
+
+def flat(owner: type) -> Iterator[tuple[Declared, Declared | None]]:
+    """Options of a dataclass and of its settings, each with the settings that it is in."""
+    for own in declared(owner):
+        if own.option.role == "settings":
+            yield from ((inner, own) for inner in declared(own.type))
+        else:
+            yield own, None
+
+
+def alternatives(kind: Any) -> tuple[Any, ...]:
+    """Types of a union, or the one type, without None."""
+    if get_origin(kind) in (Union, UnionType):
+        return tuple(a for a in get_args(kind) if a is not type(None))
+    return (kind,)
+
+
+def allows_none(kind: Any) -> bool:
+    """Whether a type has None among its values."""
+    return get_origin(kind) in (Union, UnionType) and type(None) in get_args(kind)
+
+
+def is_settings(kind: Any) -> bool:
+    """Whether a type is a dataclass."""
+    return isinstance(kind, type) and is_dataclass(kind)
+
+
+def _default(own: Field[Any]) -> Any:
+    if own.default_factory is not MISSING:
+        return own.default_factory()
+    return own.default

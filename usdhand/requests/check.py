@@ -1,0 +1,28 @@
+"""What `check` is to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from usdhand.options import argument, option
+from usdhand.requests import shared
+from usdhand.requests.base import Request
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckRequest(Request):
+    """Check files with UsdValidation and rules of our own.
+
+    Finds what validators miss and tools stumble on: joint names that are no legal prim names,
+    missing bind, rest or scales, time codes that would be rescaled. Exit 1 if there is an error.
+
+    \b
+    Example:
+      usdhand check samples/gestures
+    """
+
+    verb: ClassVar[str] = "check"
+    files: tuple[str, ...] = argument("Files, folders and wildcards.")
+    skel: str | None = shared.skel()
+    strict: bool = option("Fail on warnings too.", default=False)

@@ -1,0 +1,115 @@
+"""What `convert` is to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal
+
+from usdhand.formats.reading import Reading
+from usdhand.options import argument, option, settings
+from usdhand.requests import shared
+from usdhand.requests.base import Request
+
+Suffix = Literal["usdc", "usda", "usd", "usdz", "bvh", "glb", "gltf"]
+UpAxis = Literal["Y", "Z"]
+RootMotion = Literal["keep", "drop"]
+
+
+def read_span(text: str) -> tuple[float | None, float | None]:
+    """Read two time codes with a colon between; either may be missing.
+
+    Raises
+    ------
+    ValueError
+        if it is no such text.
+    """
+    try:
+        first, last = (float(part) if part.strip() else None for part in text.split(":"))
+    except ValueError as error:
+        raise ValueError(f"'{text}' is no FIRST:LAST in time codes.") from error
+    return first, last
+
+
+@dataclass(frozen=True)
+class Edits:
+    """What is done to a clip between reading and writing.
+
+    Attributes
+    ----------
+    fps : frames a second to resample to
+    start : time code of the first frame in the output
+    trim : first and last time code to keep, in the input's time codes
+    scale : factor on the character's size
+    root_motion : "drop" keeps the hips over the spot where they start
+    up : "Y" or "Z", the up axis of the output (USD and BVH)
+    """
+
+    fps: float | None = option("Resample to this frame rate.", default=None, metavar="RATE")
+    start: float | None = option("Time code of the first frame.", default=None, metavar="TIME")
+    trim: tuple[float | None, float | None] = option(
+        "Keep these time codes of the input.",
+        default=(None, None),
+        metavar="FIRST:LAST",
+        read=read_span,
+    )
+    scale: float = option("Factor on the character's size.", default=1.0)
+    root_motion: RootMotion = option(
+        "Whether the character travels, or stays over the spot where it starts.", default="keep"
+    )
+    up: UpAxis | None = option("Up axis of the output (USD and BVH). [default: Y]", default=None)
+
+    @property
+    def of_frames(self) -> bool:
+        """Whether the motion itself is another one afterwards."""
+        return self.fps is not None or self.trim != (None, None) or self.root_motion == "drop"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConvertRequest(Request):
+    """Convert motion between USD, BVH, glTF (also VRM) and FBX (read only).
+
+    A converted USD file stands alone, with a complete character; of a USD input all else is kept,
+    meshes, materials and cameras too. With --onto the fingers go to another character, whatever
+    its names, axes and proportions. What a file does not say is guessed, and said.
+
+    \b
+    Examples:
+      usdhand convert talk.bvh -o talk.usda --fps 30 --start 1001
+      usdhand convert takes/*.fbx --out-dir usd
+      usdhand convert gloves.glb --onto hero.usd -o hero_hands.usdc
+    """
+
+    verb: ClassVar[str] = "convert"
+    files: tuple[str, ...] = argument("Files, folders and wildcards.")
+    output: Path | None = option(
+        "The file to write; its suffix tells the format.",
+        "-o",
+        "--output",
+        default=None,
+        metavar="OUTPUT",
+        written=True,
+        reported=False,
+    )
+    out_dir: Path | None = option(
+        "Folder for the results of several inputs, or of all animations of one.",
+        default=None,
+        metavar="DIR",
+        written=True,
+        reported=False,
+    )
+    to: Suffix | None = option(
+        "Format of the files in --out-dir.  [default: usdc]", default=None, reported=False
+    )
+    onto: Path | None = option(
+        "Put the fingers of the inputs on this character, and write it instead.",
+        default=None,
+        metavar="CHARACTER",
+    )
+    edits: Edits = settings(Edits())
+    reading: Reading = settings(Reading())
+    onto_skel: str | None = shared.skel("Skeleton of the character to put fingers on.")
+    maps: tuple[Path, ...] = shared.maps()
+    report: Path | None = shared.report()
+    dry_run: bool = shared.dry_run()
+    force: bool = shared.force()

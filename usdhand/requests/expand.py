@@ -1,0 +1,38 @@
+"""What `expand` is to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from usdhand.options import argument, option
+from usdhand.requests import shared
+from usdhand.requests.base import Request
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExpandRequest(Request):
+    """Turn a reduced rig back into motion, on its own or another character.
+
+    Dependent channels are computed from the free ones (also after someone edited those) and
+    baked, with the body, into a SkelAnimation.
+
+    \b
+    Examples:
+      usdhand expand ok_rig.usda -o ok.usda
+      usdhand expand ok_rig.usda --onto samples/characters/ben.usdc -o ben_ok.usda
+    """
+
+    verb: ClassVar[str] = "expand"
+    rig: Path = argument("A rig that `reduce` wrote.")
+    output: Path = shared.output("The motion (.usda, .usdc, .usd, .usdz).")
+    onto: Path | None = option(
+        "Put the hands on this character, whatever its rig.", default=None, metavar="CHARACTER"
+    )
+    skel: str | None = shared.skel()
+    flatten: bool = shared.flatten()
+    maps: tuple[Path, ...] = shared.maps()
+    report: Path | None = shared.report()
+    dry_run: bool = shared.dry_run()
+    force: bool = shared.force()

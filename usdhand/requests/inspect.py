@@ -1,0 +1,27 @@
+"""What `inspect` is to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from usdhand.options import argument
+from usdhand.requests import shared
+from usdhand.requests.base import Request
+
+
+@dataclass(frozen=True, kw_only=True)
+class InspectRequest(Request):
+    """Show skeletons, timing, units, hands and problems of files.
+
+    \b
+    Example:
+      usdhand inspect samples/characters samples/gestures/ok_01.usdc
+    """
+
+    verb: ClassVar[str] = "inspect"
+    verbose: ClassVar[str] = "Print every channel."
+    files: tuple[str, ...] = argument("Files, folders and wildcards.")
+    skel: str | None = shared.skel()
+    maps: tuple[Path, ...] = shared.maps()

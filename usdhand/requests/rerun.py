@@ -1,0 +1,42 @@
+"""What `rerun` is to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from usdhand.options import argument, option
+from usdhand.requests import shared
+from usdhand.requests.base import Request
+
+
+@dataclass(frozen=True, kw_only=True)
+class RerunRequest(Request):
+    """Make a result again from its report: the same verb, inputs and settings.
+
+    Paths in the report are seen from the folder that you are in, as they were when it was made.
+    An input that has changed since is refused, unless --accept-changes is given.
+
+    \b
+    Example:
+      usdhand reduce samples/gestures/ok_01.usdc -o ok_rig.usda --report ok_rig.json
+      usdhand rerun ok_rig.json -o ok_rig_again.usda
+    """
+
+    verb: ClassVar[str] = "rerun"
+    verbose: ClassVar[str] = "Print all that the verb prints with -v."
+    report_file: Path = argument("A report that a verb wrote with --report.", metavar="REPORT")
+    output: Path | None = option(
+        "Write here instead of where the report says.",
+        "-o",
+        "--output",
+        default=None,
+        metavar="OUTPUT",
+        written=True,
+        reported=False,
+    )
+    accept_changes: bool = option("Take inputs as they are now.", default=False)
+    report: Path | None = shared.report()
+    dry_run: bool = shared.dry_run()
+    force: bool = shared.force()

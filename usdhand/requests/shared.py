@@ -1,0 +1,95 @@
+"""Options that mean the same in every verb that has them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from usdhand.options import option
+
+Sides = Literal["left", "right", "both"]
+
+
+def output(help: str) -> Any:  # noqa: A002
+    """``-o``: the file to write."""
+    return option(help, "-o", "--output", metavar="OUTPUT", written=True, reported=False)
+
+
+def force(what: str = "an output") -> Any:
+    """``--force``: an output that exists is replaced."""
+    return option(f"Replace {what} that exists.", default=False, reported=False)
+
+
+def dry_run() -> Any:
+    """``-n``: everything but writing."""
+    return option(
+        "Do everything but write the output.", "-n", "--dry-run", default=False, reported=False
+    )
+
+
+def flatten() -> Any:
+    """``--flatten``: one file."""
+    return option("Write one file instead of a layer over the input.", default=False)
+
+
+def skel(
+    help: str = "Path or name of the skeleton where there are several.",  # noqa: A002
+) -> Any:
+    """``--skel``: which skeleton."""
+    return option(help, default=None, metavar="PRIM")
+
+
+def maps() -> Any:
+    """``--map``: joint names of one's own."""
+    return option(
+        "TOML file with more joint-name conventions; repeatable.",
+        "--map",
+        default=(),
+        metavar="FILE",
+    )
+
+
+def report() -> Any:
+    """``--report``: the JSON document in a file."""
+    return option(
+        "Write the JSON document to a file as well.",
+        default=None,
+        metavar="FILE",
+        written=True,
+        reported=False,
+    )
+
+
+def plots() -> Any:
+    """``--plots``: pictures of the result."""
+    return option(
+        "Draw plots of the result into a folder, as SVG and PNG.",
+        default=None,
+        metavar="DIR",
+        written=True,
+        reported=False,
+        read=folder,
+    )
+
+
+def side() -> Any:
+    """``--side``: which hands."""
+    return option("Which hand.", default="both")
+
+
+def folder(text: str) -> Path:
+    """Read the name of a folder: an empty one, as of a variable that is not set, is not this one.
+
+    Raises
+    ------
+    ValueError
+        if it is empty.
+    """
+    if not text:
+        raise ValueError("no folder has an empty name; this folder is '.'")
+    return Path(text)
+
+
+def sides(choice: Sides) -> tuple[Literal["left", "right"], ...]:
+    """Sides that a choice stands for."""
+    return ("left", "right") if choice == "both" else (choice,)

@@ -1,0 +1,55 @@
+"""What `splice` is to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from usdhand.options import argument, option, settings
+from usdhand.requests import shared
+from usdhand.requests.base import Request
+from usdhand.splice.settings import SpliceSettings
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpliceRequest(Request):
+    """Put the fingers of a hand clip on a body clip, both of the same performance.
+
+    Finds out which moments belong together from how both arms move, whatever their size, timing
+    and direction in the room, retimes the hand clip and puts its fingers on the body (Majkowska,
+    Zordan and Faloutsos 2006). The body's own motion and timing stay as they are.
+
+    \b
+    Example:
+      usdhand splice samples/conversations/talk_01_body.usdc samples/hands/talk_01_hands_a.usdc \\
+        --pin 1:1 --pin 181:403 -o talk.usda --report talk.json
+
+    The hand clip of the example shows the first six seconds of the body: pins say where it begins
+    and ends. Of clips that begin and end together, no pin is needed.
+    """
+
+    verb: ClassVar[str] = "splice"
+    verbose: ClassVar[str] = "Print every phase."
+    body: Path = argument("The clip that gets the fingers.")
+    hands: Path = argument("The clip that has them.")
+    output: Path = shared.output(
+        "The body with the hand clip's fingers (.usda, .usdc, .usd, .usdz)."
+    )
+    pins: tuple[str, ...] = option(
+        "Time codes of both clips that belong together, exactly or within a tolerance in time "
+        "codes of the hand clip; for one hand with left: or right: before it; repeatable.",
+        "--pin",
+        default=(),
+        metavar="BODY:HAND[:TOL]",
+    )
+    settings: SpliceSettings = settings(SpliceSettings())
+    side: shared.Sides = shared.side()
+    flatten: bool = shared.flatten()
+    skel: str | None = shared.skel()
+    hands_skel: str | None = shared.skel("The same for the hand clip.")
+    maps: tuple[Path, ...] = shared.maps()
+    report: Path | None = shared.report()
+    plots: Path | None = shared.plots()
+    dry_run: bool = shared.dry_run()
+    force: bool = shared.force()

@@ -1,0 +1,48 @@
+"""Two motions compared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from usdhand.errors import QualityError
+from usdhand.evaluate.compare import Comparison, compare_clips
+from usdhand.formats.files import read_clip
+from usdhand.motion import Clip
+from usdhand.report.compare import compare_result, summary
+from usdhand.requests.compare import CompareRequest
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.verbs.outcome import Journal, Outcome
+
+
+def compare(
+    a: Clip | str | Path,
+    b: Clip | str | Path,
+    *,
+    align: bool = False,
+    conventions: Conventions | None = None,
+) -> Comparison:
+    """Compare motion B with motion A; see `usdhand.evaluate.compare.compare_clips`."""
+    first, second = (c if isinstance(c, Clip) else read_clip(c) for c in (a, b))
+    hands, others = find_hands(first, conventions), find_hands(second, conventions)
+    return compare_clips(first, second, hands, others, align)
+
+
+def run(request: CompareRequest, journal: Journal) -> Outcome:
+    """Compare two files; exit 5 if they differ by more than ``max_rms``."""
+    conventions = conventions_from(request.maps)
+    a, b = read_clip(request.a, request.skel), read_clip(request.b, request.skel_b or request.skel)
+    for clip in (a, b):
+        journal.about(clip.origin.path, clip.problems)
+    found = compare(a, b, align=request.align, conventions=conventions)
+    code, most = 0, request.max_rms
+    if most is not None and not found.rms_deg <= most:
+        message = (
+            f"{request.b} differs from {request.a} by {found.rms_deg:.3f} deg RMS, more than "
+            f"{most:g}."
+        )
+        error = QualityError(message)
+        journal.fail(error)
+        code = error.exit_code
+    inputs = (request.a, request.b, *request.maps)
+    return Outcome(request, inputs, lambda: compare_result(found), summary, exit_code=code)

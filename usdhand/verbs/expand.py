@@ -1,0 +1,78 @@
+"""A reduced rig turned back into motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from usdhand.formats.files import read_any
+from usdhand.formats.output import check_output
+from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.formats.usd import rig as usd_rig
+from usdhand.motion import Clip
+from usdhand.motion.resample import in_time_of
+from usdhand.reduce.method import expand as expand_channels
+from usdhand.report.expand import expand_result, summary
+from usdhand.requests.expand import ExpandRequest
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_from, find_hands, write_clip
+from usdhand.verbs.outcome import Journal, Outcome
+
+
+def expand(
+    path: str | Path, conventions: Conventions | None = None, skel: str | None = None
+) -> Clip:
+    """Motion of a rig file: dependent channels computed from its free ones.
+
+    ``skel`` chooses a rig by its skeleton where the file has several.
+    """
+    stored = usd_rig.read_stored_rig(path, skel)
+    hands = usd_rig.with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
+    return expand_channels(stored.rig, stored.free, stored.clip, hands)
+
+
+def expand_onto(
+    path: str | Path,
+    target: str | Path,
+    skel: str | None = None,
+    conventions: Conventions | None = None,
+) -> Clip:
+    """Motion of a rig file's hands on another character, in the rig's time.
+
+    The body keeps the target's own motion, its ends held, or its bind pose where it has none.
+    """
+    stored = usd_rig.read_stored_rig(path)
+    body, _ = read_any(target, skel)
+    body = in_time_of(body, stored.clip)
+    return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
+
+
+def run(request: ExpandRequest, journal: Journal) -> Outcome:
+    """Bake a rig's motion over its own input, or over another character."""
+    rig, onto, skel = request.rig, request.onto, request.skel
+    conventions = conventions_from(request.maps)
+    inputs = [rig] if onto is None else [rig, onto]
+    check_output(request.output, inputs, request.force, USD_SUFFIXES)
+    if onto is None:
+        motion = expand(rig, conventions, skel)
+    else:
+        motion = expand_onto(rig, onto, skel, conventions)
+    journal.about(motion.origin.path, motion.problems, "warning")
+    if not request.dry_run:
+        lost = write_clip(
+            motion,
+            request.output,
+            flatten=request.flatten,
+            force=request.force,
+            conventions=conventions,
+            inputs=inputs,
+        )
+        journal.about(request.output, lost, "warning", "note")
+
+    def report() -> dict[str, Any]:
+        free = len(usd_rig.read_rig(rig, None if onto else skel).free)
+        output = None if request.dry_run else str(request.output)
+        return {"output": output} | expand_result(motion, free)
+
+    written = () if request.dry_run else (request.output,)
+    return Outcome(request, (*inputs, *request.maps), report, summary, written=written)

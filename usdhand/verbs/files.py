@@ -1,0 +1,72 @@
+"""Inputs as people give them: files, folders, wildcards."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from usdhand.errors import InputError, UsageError
+from usdhand.formats.suffixes import READABLE
+
+
+def find_files(arguments: Iterable[str], suffixes: Sequence[str] = READABLE) -> list[Path]:
+    """Files named, in folders, or matching wildcards; in the order given, each once.
+
+    Wildcards are expanded here, so that all shells agree.
+
+    Raises
+    ------
+    UsageError
+        if a wildcard matches nothing or a folder holds no such file.
+    InputError
+        if a folder cannot be read.
+    """
+    found: dict[Path, None] = {}
+    try:
+        for argument in arguments:
+            found.update(dict.fromkeys(_named(argument, suffixes)))
+    except OSError as error:
+        raise InputError(f"{error.filename}: cannot be read ({error.strerror}).") from error
+    return list(found)
+
+
+def find_files_below(arguments: Iterable[str]) -> list[Path]:
+    """Like `find_files`, but a folder stands for all clips in it and in the folders below.
+
+    Raises the errors of `find_files`.
+    """
+    found: dict[Path, Path] = {}
+    for argument in arguments:
+        folder = Path(argument)
+        paths = _below(folder) if folder.is_dir() else find_files([argument])
+        for path in paths:
+            found.setdefault(path.absolute(), path)
+    return list(found.values())
+
+
+def _named(argument: str, suffixes: Sequence[str]) -> list[Path]:
+    path = Path(argument)
+    if path.is_dir():
+        inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
+        if not inside:
+            raise UsageError(f"{path} holds no {', '.join(suffixes)} file.")
+        return [p for p in inside if not p.name.startswith(".")]
+    if not path.exists() and glob.has_magic(argument):
+        matches = sorted(Path(p) for p in glob.glob(argument, recursive=True))  # noqa: PTH207
+        if not matches:
+            raise UsageError(f"No file matches {argument}.")
+        return matches
+    return [path]
+
+
+def _below(folder: Path) -> list[Path]:
+    below = (p for p in sorted(folder.rglob("*")) if p.suffix.lower() in READABLE)
+    paths = [p for p in below if p.is_file() and not _hidden(p.relative_to(folder))]
+    if not paths:
+        raise UsageError(f"{folder} and the folders below hold no {', '.join(READABLE)} file.")
+    return paths
+
+
+def _hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)

@@ -1,0 +1,202 @@
+"""A motion library built, or built again."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from usdhand.errors import InputError, OutputError, UsdHandError
+from usdhand.fill.library import LibraryClip, MotionLibrary
+from usdhand.fill.settings import Segmentation
+from usdhand.formats.output import check_output
+from usdhand.formats.usd.library import is_library, read_library, write_library
+from usdhand.problems import counted, listed
+from usdhand.report.library import library_result, summary
+from usdhand.requests.library import LibraryBuildRequest
+from usdhand.verbs.files import find_files_below
+from usdhand.verbs.library import (
+    BuildResult,
+    build_library,
+    forget_interrupted,
+    interrupted_clips,
+    is_edited,
+)
+from usdhand.verbs.outcome import Journal, Outcome
+
+COLUMNS = {"file", "label", "actor"}
+OUTPUTS = (".usd", ".usda", ".usdc")
+
+
+def run(request: LibraryBuildRequest, journal: Journal) -> Outcome:
+    """Read what is new or changed, and write the library."""
+    output = request.output
+    paths = [p for p in find_files_below(request.clips) if not _same(p, output)]
+    check_output(output, paths, True, OUTPUTS)
+    if output.exists() and not is_library(output):
+        raise OutputError(f"{output} exists and is no motion library; give another name.")
+    previous = _previous(request, journal)
+    labels = _read_labels(request.labels) if request.labels else None
+    try:
+        with _terminated_as_interrupted():
+            built = build_library(
+                paths,
+                output,
+                segmentation=_segmentation(request, None if request.rebuild else previous),
+                labels=labels,
+                previous=previous,
+                rebuild=request.rebuild,
+                maps=request.maps,
+                jobs=request.jobs,
+                progress=journal.progress("reading"),
+            )
+    except _Terminated:
+        raise TerminatedBuildError(_what_is_kept(output)) from None
+    except KeyboardInterrupt:
+        raise InterruptedBuildError(_what_is_kept(output)) from None
+    write_library(built.library, output, force=True)
+    forget_interrupted(output)
+    _tell(built, previous, request, journal)
+
+    def report() -> dict[str, Any]:
+        removed = [{"path": x.path, "label": x.label, "actor": x.actor} for x in built.removed]
+        return library_result(built.library) | {
+            "output": str(output),
+            "read": built.read,
+            "unchanged": built.unchanged,
+            "labels_without_clip": list(built.unmatched),
+            "removed": removed,
+        }
+
+    return Outcome(
+        request,
+        (*paths, *request.maps),
+        report,
+        summary,
+        settings={"segmentation": asdict(built.library.segmentation)},
+        written=(output,),
+    )
+
+
+def _tell(
+    built: BuildResult,
+    previous: MotionLibrary | None,
+    request: LibraryBuildRequest,
+    journal: Journal,
+) -> None:
+    for entry in previous.damaged if previous else ():
+        message = f"{entry.file} of the old library cannot be used: {entry.message}"
+        journal.warn("damaged", message)
+    for entry in built.library.left_out:
+        journal.warn(entry.code, f"left out: {entry.file}: {entry.message}")
+    if built.removed:
+        journal.warn("removed", _what_is_removed(built.removed))
+    if built.unmatched:
+        some = listed(built.unmatched)
+        message = f"{len(built.unmatched)} rows match no clip: {some}"
+        journal.warn("labels-without-clip", message, request.labels or "")
+
+
+def _previous(request: LibraryBuildRequest, journal: Journal) -> MotionLibrary | None:
+    """The library that is built again; of one that cannot be read, --rebuild needs nothing."""
+    if not request.output.exists():
+        return None
+    try:
+        return read_library(request.output)
+    except InputError as error:
+        if not request.rebuild:
+            raise
+        journal.warn("lost-labels", f"labels and actors of the old library are lost: {error}")
+        return None
+
+
+def _what_is_removed(clips: Sequence[LibraryClip]) -> str:
+    """Say which clips of the old library were not given; work of a person in full."""
+    text = (
+        f"{counted(len(clips), 'clip')} of the old library removed, since not given this time: "
+        + listed([clip.path for clip in clips])
+    )
+    edited = [clip for clip in clips if is_edited(clip) or clip.actor]
+    if edited:
+        words = (f"{x.path}: {x.label}" + (f" ({x.actor})" if x.actor else "") for x in edited)
+        text += "\n  with labels of their own: " + ", ".join(words)
+    return text
+
+
+def _what_is_kept(output: Path) -> str:
+
+    count = interrupted_clips(output)
+    verb = "is" if count == 1 else "are"
+    kept = f"{counted(count, 'clip')} read so far {verb} kept" if count else "nothing was read yet"
+    old = "; the library is as it was" if output.exists() else ""
+    return f"Interrupted: {kept}{old}. The same command goes on where it stopped."
+
+
+class InterruptedBuildError(UsdHandError):
+    """A build was interrupted (exit 1)."""
+
+
+class TerminatedBuildError(UsdHandError):
+    """A build was ended by SIGTERM (exit 143)."""
+
+    exit_code = 143
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM while clips are read."""
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """SIGTERM raises `_Terminated`, so that what was read so far is kept."""
+
+    def terminate(*_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+        raise _Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals are the main thread's
+        return
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _segmentation(request: LibraryBuildRequest, previous: MotionLibrary | None) -> Segmentation:
+    usual = previous.segmentation if previous else Segmentation()
+    given = {"speed": request.speed, "shortest": request.shortest, "longest": request.longest}
+    return replace(usual, **{k: v for k, v in given.items() if v is not None})
+
+
+def _read_labels(path: Path) -> dict[str, tuple[str, str]]:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            head = file.readline()
+            file.seek(0)
+            reader = csv.DictReader(file, delimiter=max(",;\t", key=head.count))
+            rows, columns = list(reader), set(reader.fieldnames or ())
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read as CSV ({error}).") from error
+    if not {"file", "label"} <= columns:
+        raise InputError(f"{path}: needs a head with the columns file and label.")
+    if columns - COLUMNS:
+        unknown = ", ".join(sorted(map(str, columns - COLUMNS)))
+        raise InputError(f"{path}: unknown columns {unknown}; there are file, label and actor.")
+    return {
+        Path((row["file"] or "").strip()).as_posix(): (
+            (row["label"] or "").strip(),
+            (row.get("actor") or "").strip(),
+        )
+        for row in rows
+    }
+
+
+def _same(a: Path, b: Path) -> bool:
+    return a.exists() and b.exists() and a.samefile(b)

@@ -1,0 +1,128 @@
+"""What a run comes to: what was written, what it reports, and everything odd on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from usdhand.errors import UsdHandError
+from usdhand.problems import Problem, Severity
+from usdhand.progress import each
+from usdhand.report.document import document, dumps
+from usdhand.requests.base import Request
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+T = TypeVar("T")
+
+# Gets what is done, how many steps are done, and how many there are; False stops the run.
+Watch = Callable[[str, int, int], object]
+
+
+class Journal:
+    """Problems of a run in the order in which they came; a listener hears of each at once."""
+
+    def __init__(
+        self,
+        listener: Callable[[Problem], object] | None = None,
+        watch: Watch | None = None,
+    ) -> None:
+        self.problems: list[Problem] = []
+        self._listener = listener
+        self._watch = watch
+
+    def tell(self, *problems: Problem) -> None:
+        """Keep problems, and tell whoever listens."""
+        for problem in problems:
+            self.keep(problem)
+            if self._listener is not None:
+                self._listener(problem)
+
+    def keep(self, *problems: Problem) -> None:
+        """Keep problems that are told elsewhere, such as in the text of the result."""
+        self.problems += problems
+
+    def warn(self, code: str, message: str, file: object = "", where: str = "") -> None:
+        """Tell a warning."""
+        self.tell(Problem(code, message, where, "warning", str(file)))
+
+    def fail(self, error: UsdHandError, file: object = "") -> None:
+        """Tell an error that ends the work on one file, not the run."""
+        code = type(error).__name__.removesuffix("Error").lower()
+        self.tell(Problem(code, str(error), severity="error", file=str(file)))
+
+    def about(self, file: object, problems: Iterable[Problem], *told: Severity) -> None:
+        """Tell the problems of a file that are as severe as ``told``, and keep the others."""
+        for problem in problems:
+            (self.tell if problem.severity in told else self.keep)(
+                replace(problem, file=problem.file or str(file))
+            )
+
+    def each(self, items: Sequence[T] | Iterable[T], doing: str, total: int = -1) -> Iterator[T]:
+        """Yield items, and tell how far it is."""
+        count = total if total >= 0 else len(items)  # type: ignore[arg-type]
+        return each(items, count, self.progress(doing))
+
+    def progress(self, doing: str) -> Callable[[int, int], object] | None:
+        """What to tell how far ``doing`` is; None where nobody watches."""
+        watch = self._watch
+        return None if watch is None else lambda done, total: watch(doing, done, total)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of a request.
+
+    Attributes
+    ----------
+    request : what was asked for
+    inputs : files whose content the result depends on
+    report : makes the verb's part of the report, plain data; only called where it is wanted
+    summary : makes the text for people of that data; the flag asks for all of it
+    settings : more of the report's settings than the request says itself
+    figures : draws the plots that the request asked for
+    written : outputs, reports and plots not among them
+    problems : everything odd, in the order in which it came
+    exit_code : of the command line
+    """
+
+    request: Request
+    inputs: tuple[Path, ...]
+    report: Callable[[], dict[str, Any]]
+    summary: Callable[[Mapping[str, Any], bool], str]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    figures: Callable[[], Mapping[str, Figure]] | None = None
+    written: tuple[Path, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    exit_code: int = 0
+
+    @cached_property
+    def result(self) -> dict[str, Any]:
+        """The verb's part of the report."""
+        return self.report()
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The whole report: how it was made, its inputs with their hashes, and the result."""
+        return document(
+            self.request,
+            self.inputs,
+            self.request.reported() | dict(self.settings),
+            self.result,
+        )
+
+    def to_json(self) -> str:
+        """Return the report as text."""
+        return dumps(self.document)
+
+    def to_text(self, verbose: bool = False) -> str:
+        """Return what a person wants to read."""
+        return self.summary(self.result, verbose)
+
+    def __repr__(self) -> str:
+        wrote = ", ".join(map(str, self.written)) or "nothing"
+        return f"Outcome({self.request.verb}: wrote {wrote}, {len(self.problems)} problems)"

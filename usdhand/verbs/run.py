@@ -1,0 +1,59 @@
+"""Every verb runs through here, whoever asks: the command line, a report, a batch, Python."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from usdhand.formats.output import check_output, written_beside
+from usdhand.problems import Problem
+from usdhand.report.plots.style import write_plots
+from usdhand.requests.base import Request
+from usdhand.verbs.outcome import Journal, Outcome, Watch
+
+
+def run(
+    request: Request,
+    *,
+    listener: Callable[[Problem], object] | None = None,
+    watch: Watch | None = None,
+) -> Outcome:
+    """Do what a request asks for.
+
+    Parameters
+    ----------
+    listener : hears of everything odd as it comes
+    watch : gets what is done, how many steps are done, and how many there are; what returns False
+        stops the run
+
+    Raises
+    ------
+    UsdHandError
+        if it cannot be done; its class says what kind of reason there is.
+    """
+    return run_verb(request, Journal(listener, watch))
+
+
+def run_verb(request: Request, journal: Journal) -> Outcome:
+    """Do what a request asks for, on a journal that is there; see `run`."""
+    report, force = getattr(request, "report", None), getattr(request, "force", False)
+    if report is not None:
+        check_output(report, (), force, (".json",))
+    module = importlib.import_module(f"usdhand.verbs.{request.verb.replace(' ', '_')}")
+    verb: Callable[[Any, Journal], Outcome] = module.run
+    outcome = replace(verb(request, journal), problems=tuple(journal.problems))
+    if report is not None and outcome.request is request:
+        _write(report, outcome.to_json(), force)
+    folder = getattr(request, "plots", None)
+    if folder is not None and outcome.figures is not None:
+        write_plots(folder, outcome.figures(), force)
+    return outcome
+
+
+def _write(path: Path, text: str, force: bool) -> None:
+    check_output(path, (), force, (".json",))
+    with written_beside(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
