@@ -16,12 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
+from usdhand import read_clip
 from usdhand.evaluate.reconstruction import HandError
 from usdhand.fill.library import MotionLibrary
 from usdhand.fill.settings import PAPER, PAPER_SEGMENTATION, FillSettings
 from usdhand.motion import Clip
-from usdhand.verbs import fill as filling
-from usdhand.verbs import read_clip
+from usdhand.verbs.evaluate import measure_library
+from usdhand.verbs.library import build_library
 
 SIDES = ("right", "left")
 DEFAULT = FillSettings()
@@ -71,13 +72,13 @@ def main() -> None:
 
 
 def build(files: Sequence[Path], folder: Path) -> MotionLibrary:
-    return filling.build_library(files, folder / "library.usdc").library
+    return build_library(files, folder / "library.usdc").library
 
 
 def errors_of(
     library: MotionLibrary, folder: Path, takes: Sequence[Clip], settings: FillSettings
 ) -> list[HandError]:
-    errors, left = filling.measure_library(library, folder, settings, takes=takes)
+    errors, left = measure_library(library, folder, settings, takes=takes)
     for clip in left:
         print(f"left out: {clip.path}: {clip.reason}")
     return errors

@@ -21,11 +21,13 @@ from typing import Any
 
 import numpy as np
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.fill.settings import FillSettings
+from usdhand.formats.usd.library import read_library, write_library
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
-from usdhand.verbs import fill as filling
+from usdhand.verbs.fill import fill_fingers, write_filled
+from usdhand.verbs.library import build_library
 
 HERE = Path(__file__).resolve().parent.parent
 REAL = HERE.parent / "shared" / "data" / "studiogalt" / "full"
@@ -50,7 +52,7 @@ def main() -> None:
 
 def long_body(takes: Sequence[Path], seconds: float, fps: float, output: Path) -> None:
     """Write takes one after the other as one motion of the first one's character."""
-    read = [api.read_clip(take) for take in takes]
+    read = [usdhand.read_clip(take) for take in takes]
     alike = [resample(c, fps) for c in read if c.skeleton.joints == read[0].skeleton.joints]
     clips = alike * int(np.ceil(seconds / sum(clip.duration for clip in alike)))
     count = round(seconds * fps)
@@ -64,7 +66,7 @@ def long_body(takes: Sequence[Path], seconds: float, fps: float, output: Path) -
         translations=all_of("translations"),
         scales=all_of("scales"),
     )
-    api.write_clip(body, output, flatten=True)
+    usdhand.write_clip(body, output, flatten=True)
 
 
 def steps(takes: Sequence[Path], body: Path, library: Path, folder: Path) -> None:
@@ -76,19 +78,17 @@ def steps(takes: Sequence[Path], body: Path, library: Path, folder: Path) -> Non
         print(f"{label:28}{time.perf_counter() - start:8.2f} s")
         return result
 
-    built = timed("build the library", lambda: filling.build_library(takes, library)).library
-    timed("write it", lambda: filling.write_library(built, library))
-    motions = timed("read the library", lambda: filling.read_library(library))
-    clip = timed("read the body", lambda: api.read_clip(body))
-    timed("fill, first time", lambda: filling.fill_fingers(clip, motions, replace_motion=True))
-    filled = timed(
-        "fill, compiled", lambda: filling.fill_fingers(clip, motions, replace_motion=True)
-    )
-    timed("write", lambda: filling.write_filled(filled, folder / "filled.usdc"))
+    built = timed("build the library", lambda: build_library(takes, library)).library
+    timed("write it", lambda: write_library(built, library))
+    motions = timed("read the library", lambda: read_library(library))
+    clip = timed("read the body", lambda: usdhand.read_clip(body))
+    timed("fill, first time", lambda: fill_fingers(clip, motions, replace_motion=True))
+    filled = timed("fill, compiled", lambda: fill_fingers(clip, motions, replace_motion=True))
+    timed("write", lambda: write_filled(filled, folder / "filled.usdc"))
     three = FillSettings(alternatives=3)
     timed(
         "fill, 3 alternatives",
-        lambda: filling.fill_fingers(clip, motions, three, replace_motion=True),
+        lambda: fill_fingers(clip, motions, three, replace_motion=True),
     )
     print(f"{len(clip)} frames, {len(clip.skeleton)} joints, {len(motions.clips)} clips, segments: "
           f"{[len(p.alternatives[0].choices) for p in filled.parts]}")  # fmt: skip

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from usdhand import find_hands, read_clip
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.anatomy.hand import FINGERS, SIDE_PREFIX, Side
 from usdhand.evaluate.compare import find_lag
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
-from usdhand.verbs import find_hands, read_clip
 
 # Two files agree about a thumb if it turns the same way against the forearm within this.
 SAME_SOURCE_DEG = 1.0

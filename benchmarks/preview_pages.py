@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.anatomy import Hands
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
@@ -78,8 +78,8 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, help="where to keep the pages")
     folder = parser.parse_args().folder or Path(tempfile.mkdtemp())
     clip = minute()
-    api.write_clip(clip, folder / "minute.usdc", force=True)
-    lines, points = hand_lines(clip, api.find_hands(clip))
+    usdhand.write_clip(clip, folder / "minute.usdc", force=True)
+    lines, points = hand_lines(clip, usdhand.find_hands(clip))
     pages: dict[str, tuple[Callable[[Path], None], str, str | None]] = {
         "k3d, both hands as lines": (lambda p: k3d_page(lines, points, p), CANVAS, K3D_STEP),
         "plotly, both hands as lines": (
@@ -106,7 +106,7 @@ def minute() -> Clip:
     """A minute of conversations and gestures, one after the other."""
     talks = [SAMPLES / "conversations" / f"talk_0{n}_full.usdc" for n in (1, 2)]
     files = [*talks, *sorted((SAMPLES / "gestures").glob("*_0[1-4].usdc"))]
-    clips = [resample(api.read_clip(f), FPS) for f in files]
+    clips = [resample(usdhand.read_clip(f), FPS) for f in files]
     along = {
         name: np.concatenate([getattr(c, name) for c in clips])[: int(SECONDS * FPS) + 1]
         for name in ("rotations", "translations", "scales")

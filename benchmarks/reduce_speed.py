@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from usdhand import find_hands, read_clip
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate_rotations
 from usdhand.reduce.method import apply_rig, fit_rig
 from usdhand.reduce.settings import PRESETS, Target
-from usdhand.verbs import find_hands, read_clip
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "gestures" / "ok_01.usdc"
 NOISE_DEG = 1.0

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from hand_agreement import agreement_of_rigs, off_axis_shares
 
+from usdhand import find_hands, read_clip
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
@@ -25,7 +26,6 @@ from usdhand.reduce.errors import Errors, pca_rms
 from usdhand.reduce.method import apply_rig, fit_rig
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.settings import PRESETS, Fit, Target
-from usdhand.verbs import find_hands, read_clip
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "gestures"
 FITS: dict[str, tuple[Fit, int]] = {

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from splice_peers import PEERS
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.method import align, pinned_band
 from usdhand.splice.phases import smoothed
@@ -105,8 +105,8 @@ def peer(package: str, file: Path, interpreters: list[str]) -> str:
 def markers_of(folder: Path) -> list[Markers]:
     found = []
     for path in sorted(folder.glob("*.usdc")):
-        clip = api.read_clip(path)
-        hands = api.find_hands(clip)
+        clip = usdhand.read_clip(path)
+        hands = usdhand.find_hands(clip)
         if "right" in hands.frames:
             found.append(hand_markers(clip, hands, "right", SETTINGS.fps))
     return found

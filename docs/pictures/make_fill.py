@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from sheet import ROOT, Column, sheet
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.verbs import fill as filling
 
 TALKS = ROOT / "samples" / "conversations"
@@ -22,10 +22,10 @@ def main() -> None:
     folder = Path(tempfile.mkdtemp())
     clips = sorted((ROOT / "samples" / "gestures").glob("*.usdc"))
     library = filling.build_library(clips, folder / "library.usdc").library
-    body = api.read_clip(TALKS / "talk_01_body.usdc")
+    body = usdhand.read_clip(TALKS / "talk_01_body.usdc")
     filled = filling.fill_fingers(body, library)
     filling.write_filled(filled, folder / "filled.usdc")
-    truth = api.read_clip(TALKS / "talk_01_full.usdc")
+    truth = usdhand.read_clip(TALKS / "talk_01_full.usdc")
     columns = [
         Column("body clip: fingers still", TALKS / "talk_01_body.usdc"),
         Column("filled from 64 gestures", folder / "filled.usdc"),
@@ -38,7 +38,7 @@ def main() -> None:
             (filled.clips[0], "-", f"{name} filled"),
             (truth, "--", "true"),
         ):
-            curve = api.find_hands(clip).encode(clip).select([name]).values
+            curve = usdhand.find_hands(clip).encode(clip).select([name]).values
             axes.plot(seconds, curve, f"C{number}", ls=style, lw=1.2, label=label)
     axes.set_xlim(0, seconds[-1])
     axes.set_ylim(top=85)

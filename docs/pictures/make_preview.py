@@ -13,7 +13,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 from playwright.sync_api import Browser, sync_playwright
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.report.document import document, dumps
 from usdhand.report.fill import fill_result
 from usdhand.verbs import fill as filling
@@ -33,8 +33,8 @@ def main() -> None:
     folder = Path(tempfile.mkdtemp())
     fill_page, rig_page = folder / "fill.html", folder / "rig.html"
     make_fill(folder, fill_page)
-    [reduction] = api.reduce_hands([api.read_clip(TALK)])
-    api.write_rig(reduction, folder / "reduced.usdc")
+    [reduction] = usdhand.reduce_hands([usdhand.read_clip(TALK)])
+    usdhand.write_rig(reduction, folder / "reduced.usdc")
     write_preview(preview_clips([folder / "reduced.usdc", TALK]), rig_page)
     path = os.environ.get("USDHAND_CHROMIUM", "/usr/bin/chromium")
     with sync_playwright() as playwright:
@@ -55,7 +55,7 @@ def make_fill(folder: Path, page: Path) -> None:
     clips = sorted((SAMPLES / "gestures").glob("*.usdc"))
     library = filling.build_library(clips, folder / "library.usdc").library
     taken = SAMPLES / "conversations" / "talk_01_body.usdc"
-    body = api.read_clip(taken)
+    body = usdhand.read_clip(taken)
     filled = filling.fill_fingers(body, library)
     filling.write_filled(filled, folder / "filled.usdc")
     report = document("fill", [taken], {}, fill_result(filled, library, body))

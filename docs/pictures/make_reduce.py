@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from sheet import BEN_HAND, ROOT, Column, sheet
 
-from usdhand import verbs as api
+import usdhand
 
 CLIP = ROOT / "samples" / "conversations" / "talk_01_full.usdc"
 BEN = ROOT / "samples" / "characters" / "ben.usdc"
@@ -21,10 +21,10 @@ def main() -> None:
     """Reduce, expand, render and plot."""
     folder = Path(tempfile.mkdtemp())
     rig, ben = folder / "rig.usdc", folder / "ben.usdc"
-    clip = api.read_clip(CLIP)
-    [reduction] = api.reduce_hands([clip])
-    api.write_rig(reduction, rig)
-    api.write_clip(api.expand_onto(rig, BEN), ben)
+    clip = usdhand.read_clip(CLIP)
+    [reduction] = usdhand.reduce_hands([clip])
+    usdhand.write_rig(reduction, rig)
+    usdhand.write_clip(usdhand.expand_onto(rig, BEN), ben)
     free, total = len(reduction.rig.free), len(reduction.rig.names)
     columns = [
         Column(f"original: {total} channels", CLIP),

@@ -21,13 +21,13 @@ SAMPLES = 32
 
 def main() -> None:
     """Fill, render, compose."""
-    from usdhand import verbs as api
+    import usdhand
     from usdhand.verbs import fill as filling
 
     folder = Path(tempfile.mkdtemp())
     clips = sorted((ROOT / "samples" / "gestures").glob("*.usdc"))
     library = filling.build_library(clips, folder / "library.usdc").library
-    filled = filling.fill_fingers(api.read_clip(BODY), library)
+    filled = filling.fill_fingers(usdhand.read_clip(BODY), library)
     filling.write_filled(filled, folder / "after.usdc")
     shots = [
         [str(BODY), str(folder / "before")],

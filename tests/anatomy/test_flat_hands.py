@@ -14,6 +14,7 @@ from builders.moving_hands import at_bind, gesture, hand_map, moved, random_turn
 from conftest import REPOSITORY, shared_data
 from numpy.testing import assert_allclose
 
+from usdhand import find_hands, read_clip
 from usdhand.anatomy.channels import Channels, Hands, following
 from usdhand.anatomy.frames import hand_frames
 from usdhand.anatomy.hand import DIGITS, SIDES, CharacterMap, HandMap
@@ -23,7 +24,6 @@ from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 from usdhand.splice.merge import with_wrist
-from usdhand.verbs import find_hands, read_clip
 from usdhand.verbs.convert import retarget_hands, write_new
 
 SAMPLES = REPOSITORY / "samples"

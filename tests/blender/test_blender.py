@@ -13,7 +13,7 @@ import pytest
 from builders.blender import Y_UP, blender_python, turned
 from conftest import REPOSITORY, shared_data
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.motion import forward_kinematics
 from usdhand.motion import rotations as rot
 
@@ -47,7 +47,7 @@ def load(path: Path, folder: Path, frames: list[float]) -> Loaded:
 
 def assert_same_motion(path: Path, folder: Path) -> Loaded:
     """Every bone's rotation away from its bind pose, in the world, is what we read."""
-    clip = api.read_clip(path)
+    clip = usdhand.read_clip(path)
     index = np.unique(np.linspace(0, len(clip) - 1, 6).astype(int))
     # Blender plays at 24 frames a second of the file's time codes unless told otherwise.
     loaded = load(path, folder, [float(t) for t in clip.time_codes[index]])
@@ -66,10 +66,10 @@ def assert_same_motion(path: Path, folder: Path) -> Loaded:
 
 @pytest.mark.parametrize("name", ["gestures/ok_02", "gestures_ben/wipe_01"])
 def test_samples_load(tmp_path: Path, name: str) -> None:
-    clip = api.read_clip(REPOSITORY / "samples" / f"{name}.usdc")
-    [reduction] = api.reduce_hands([clip])
+    clip = usdhand.read_clip(REPOSITORY / "samples" / f"{name}.usdc")
+    [reduction] = usdhand.reduce_hands([clip])
     rig, motion = tmp_path / "rig.usda", tmp_path / "motion.usdc"
-    api.write_rig(reduction, rig)
+    usdhand.write_rig(reduction, rig)
     loaded = assert_same_motion(rig, tmp_path)
     for relation in reduction.rig.relations:
         prefix = f"HandRig/usdhand:channel:{relation.name}"
@@ -78,23 +78,23 @@ def test_samples_load(tmp_path: Path, name: str) -> None:
             assert loaded.properties[f"{prefix}:controller"] == relation.controllers[0]
             assert loaded.properties[f"{prefix}:slope"] == pytest.approx(relation.slopes[0])
             assert loaded.properties[f"{prefix}:offset"] == pytest.approx(relation.offset)
-    api.write_clip(api.expand(rig), motion)
+    usdhand.write_clip(usdhand.expand(rig), motion)
     assert_same_motion(motion, tmp_path)
 
 
 def test_onto_another_character_loads(tmp_path: Path) -> None:
-    clip = api.read_clip(REPOSITORY / "samples" / "gestures" / "big_03.usdc")
-    [reduction] = api.reduce_hands([clip])
-    api.write_rig(reduction, tmp_path / "rig.usda")
+    clip = usdhand.read_clip(REPOSITORY / "samples" / "gestures" / "big_03.usdc")
+    [reduction] = usdhand.reduce_hands([clip])
+    usdhand.write_rig(reduction, tmp_path / "rig.usda")
     character = REPOSITORY / "samples" / "characters" / "ben.usdc"
-    other = api.expand_onto(tmp_path / "rig.usda", character)
-    api.write_clip(other, tmp_path / "ben.usdc", flatten=True)
+    other = usdhand.expand_onto(tmp_path / "rig.usda", character)
+    usdhand.write_clip(other, tmp_path / "ben.usdc", flatten=True)
     assert_same_motion(tmp_path / "ben.usdc", tmp_path)
 
 
 @pytest.mark.real_data
 def test_a_real_take_loads(tmp_path: Path) -> None:
     take = shared_data("studiogalt", "full", "SG_ASL_7_2023_1_29.usdc")
-    [reduction] = api.reduce_hands([api.read_clip(take)])
-    api.write_rig(reduction, tmp_path / "rig.usda")
+    [reduction] = usdhand.reduce_hands([usdhand.read_clip(take)])
+    usdhand.write_rig(reduction, tmp_path / "rig.usda")
     assert_same_motion(tmp_path / "rig.usda", tmp_path)

@@ -20,7 +20,7 @@ from conftest import REPOSITORY, shared_data
 from numpy.typing import NDArray
 from pxr import Usd
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.anatomy.angles import from_euler, from_swing_twist
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
@@ -50,8 +50,8 @@ def blender(folder: Path, **session: object) -> dict[str, object]:
 
 
 def reduced(clip: Clip, target: Path, **settings: object) -> ReducedRig:
-    [reduction] = api.reduce_hands([clip], ReduceSettings(**settings))  # type: ignore[arg-type]
-    api.write_rig(reduction, target)
+    [reduction] = usdhand.reduce_hands([clip], ReduceSettings(**settings))  # type: ignore[arg-type]
+    usdhand.write_rig(reduction, target)
     return reduction.rig
 
 
@@ -62,7 +62,7 @@ def some_frames(clip: Clip) -> NDArray[np.intp]:
 def hand_angles(clip: Clip, poses: Path, index: NDArray[np.intp]) -> NDArray[np.float64]:
     """Degrees (frames, joints) between hand joints in Blender and of a clip, from their parents."""
     shown, skeleton = np.load(poses), clip.skeleton
-    joints = [j for f in api.find_hands(clip).frames.values() for j in f.joints]
+    joints = [j for f in usdhand.find_hands(clip).frames.values() for j in f.joints]
     assert len(joints) == 30
     turns, bones = turned(shown["posed"]), list(shown["names"])
     own = [bones.index(skeleton.names[j]) for j in joints]
@@ -103,12 +103,12 @@ def trip(clip: Clip, folder: Path, edits: list[list[object]], rig: Path) -> dict
     assert said["range"] == [stage.GetStartTimeCode(), stage.GetEndTimeCode()]
     assert "HandRig" not in said["objects"]  # type: ignore[operator]
     run("expand", edited, "-o", folder / "expanded.usdc")
-    expanded = api.read_clip(folder / "expanded.usdc")
+    expanded = usdhand.read_clip(folder / "expanded.usdc")
     assert len(expanded) == len(clip)
     away = hand_angles(expanded, folder / "poses.npz", index).max()
     print(f"{away:.4f} degrees at most")
     assert away < TOLERANCE_DEG
-    unedited = hand_angles(api.expand(rig), folder / "poses.npz", index).max()
+    unedited = hand_angles(usdhand.expand(rig), folder / "poses.npz", index).max()
     assert (unedited > 5.0) == bool(edits)
     return said
 
@@ -130,7 +130,7 @@ def test_the_guide_works_as_written(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 @in_blender
 def test_an_unedited_rig_comes_back_as_it_was(tmp_path: Path) -> None:
-    clip = api.read_clip(SAMPLES / "gestures" / "ok_02.usdc")
+    clip = usdhand.read_clip(SAMPLES / "gestures" / "ok_02.usdc")
     rig = reduced(clip, tmp_path / "rig.usda")
     said = trip(clip, tmp_path, [], tmp_path / "rig.usda")
     assert set(said["keys"]) == set(rig.free)  # type: ignore[call-overload]
@@ -147,8 +147,8 @@ def test_an_unedited_rig_comes_back_as_it_was(tmp_path: Path) -> None:
 
 @in_blender
 def test_edits_come_back_and_the_blend_file_keeps_its_drivers(tmp_path: Path) -> None:
-    clip = api.read_clip(SAMPLES / "gestures" / "big_03.usdc")
-    rig = reduced(clip, tmp_path / "rig.usdc", fit="least-squares", most_controllers=2)
+    clip = usdhand.read_clip(SAMPLES / "gestures" / "big_03.usdc")
+    rig = reduced(clip, tmp_path / "rig.usdc", fit="least-squares", controllers=2)
     assert any(len(r.controllers) == 2 for r in rig.relations)
     frame = float(clip.time_codes[some_frames(clip)[3]])
     edits = edits_of(rig, frame)
@@ -169,7 +169,7 @@ def test_edits_come_back_and_the_blend_file_keeps_its_drivers(tmp_path: Path) ->
 
 @in_blender
 def test_other_units_and_up_axis(tmp_path: Path) -> None:
-    clip = api.read_clip(SAMPLES / "gestures_ben" / "wipe_01.usdc")
+    clip = usdhand.read_clip(SAMPLES / "gestures_ben" / "wipe_01.usdc")
     rig = reduced(clip, tmp_path / "rig.usda")
     trip(clip, tmp_path, edits_of(rig, 20.0), tmp_path / "rig.usda")
 
@@ -177,10 +177,10 @@ def test_other_units_and_up_axis(tmp_path: Path) -> None:
 @in_blender
 @pytest.mark.real_data
 def test_a_character_of_maya(tmp_path: Path) -> None:
-    reduced(api.read_clip(SAMPLES / "gestures" / "big_03.usdc"), tmp_path / "big.usda")
+    reduced(usdhand.read_clip(SAMPLES / "gestures" / "big_03.usdc"), tmp_path / "big.usda")
     maya = shared_data("maya", "HIK_Export.usda")
-    api.write_clip(api.expand_onto(tmp_path / "big.usda", maya), tmp_path / "maya.usdc")
-    clip = api.read_clip(tmp_path / "maya.usdc")
+    usdhand.write_clip(usdhand.expand_onto(tmp_path / "big.usda", maya), tmp_path / "maya.usdc")
+    clip = usdhand.read_clip(tmp_path / "maya.usdc")
     rig = reduced(clip, tmp_path / "rig.usda")
     trip(clip, tmp_path, edits_of(rig, 20.0), tmp_path / "rig.usda")
 
@@ -191,7 +191,7 @@ def test_a_character_of_maya(tmp_path: Path) -> None:
 def test_a_real_take_whose_thumbs_hang_off_the_forearm(tmp_path: Path, rig_size: str) -> None:
     folder = shared_data("studiogalt", rig_size)
     take = "SG_ASL_7_2023_1_29.usdc" if rig_size == "full" else sorted(folder.iterdir())[0].name
-    clip = api.read_clip(folder / take)
+    clip = usdhand.read_clip(folder / take)
     rig = reduced(clip, tmp_path / "rig.usda")
     said = trip(clip, tmp_path, edits_of(rig, 20.0), tmp_path / "rig.usda")
     assert said["drivers"] == 120 + sum(r.kind == "linear" for r in rig.relations)
@@ -204,7 +204,7 @@ def test_files_that_are_no_rig_and_outputs_that_are_are_refused(tmp_path: Path) 
     assert "no hand rig" in str(said["refused"])
     assert said["objects"] == 0
     rig = tmp_path / "rig.usda"
-    reduced(api.read_clip(clip), rig)
+    reduced(usdhand.read_clip(clip), rig)
     before = rig.read_bytes()
     said = blender(tmp_path, **{"import": rig, "export": rig, "thin": 0.5})
     assert "stays as it is" in str(said["refused"])
@@ -232,7 +232,7 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
     with pytest.raises(rig_file.RigError, match="cannot be read as USD"):
         rig_file.read_rigs(str(missing))
     rig = tmp_path / "rig.usda"
-    reduced(api.read_clip(SAMPLES / "gestures" / "ok_02.usdc"), rig)
+    reduced(usdhand.read_clip(SAMPLES / "gestures" / "ok_02.usdc"), rig)
     [found] = rig_file.read_rigs(str(rig))
     edited = {c.name: c for c in found.free[:1]}
     with pytest.raises(rig_file.RigError, match="no such folder to write edited"):

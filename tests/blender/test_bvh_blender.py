@@ -11,7 +11,7 @@ import pytest
 from builders.blender import Y_UP, blender_python, turned
 from conftest import REPOSITORY, shared_data
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.formats.bvh.read import read_clip
 from usdhand.formats.bvh.write import write_clip
 from usdhand.motion import Clip, forward_kinematics
@@ -64,7 +64,7 @@ def assert_blender_agrees(clip: Clip, file: Path, folder: Path, cm_per_unit: flo
 
 @pytest.mark.parametrize("name", ["gestures/ok_02", "gestures_ben/wipe_01"])
 def test_samples_agree(tmp_path: Path, name: str) -> None:
-    clip = api.read_clip(REPOSITORY / "samples" / f"{name}.usdc")
+    clip = usdhand.read_clip(REPOSITORY / "samples" / f"{name}.usdc")
     write_clip(clip, tmp_path / "out.bvh")
     assert_blender_agrees(clip, tmp_path / "out.bvh", tmp_path)
 
@@ -72,7 +72,7 @@ def test_samples_agree(tmp_path: Path, name: str) -> None:
 @pytest.mark.real_data
 @pytest.mark.parametrize("name", REAL)
 def test_real_takes_agree(tmp_path: Path, name: str) -> None:
-    clip = api.read_clip(shared_data(*name.split("/")))
+    clip = usdhand.read_clip(shared_data(*name.split("/")))
     write_clip(clip, tmp_path / "out.bvh")
     assert_blender_agrees(clip, tmp_path / "out.bvh", tmp_path)
 

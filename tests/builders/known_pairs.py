@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
+from usdhand import find_hands, read_clip
 from usdhand.anatomy import Channels, Hands, Side
 from usdhand.evaluate.compare import find_lag
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.motion.rotations import Array
-from usdhand.verbs import find_hands, read_clip
 
 NOISE_CM = 0.3
 PALM_CM = 8.0

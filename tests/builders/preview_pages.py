@@ -17,7 +17,7 @@ import pytest
 from builders.cli_runner import run
 from conftest import REPOSITORY
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
@@ -88,7 +88,7 @@ def unpacked(document: dict[str, Any]) -> list[np.ndarray]:
 
 def joined(files: Sequence[Path], output: Path, seconds: float, fps: float = 60.0) -> Clip:
     """Clips of one character, one after the other: motion that does not repeat itself."""
-    clips = [resample(api.read_clip(f), fps) for f in files]
+    clips = [resample(usdhand.read_clip(f), fps) for f in files]
     clips = [c for c in clips if c.skeleton.joints == clips[0].skeleton.joints]
 
     def along(name: str) -> np.ndarray:
@@ -100,7 +100,7 @@ def joined(files: Sequence[Path], output: Path, seconds: float, fps: float = 60.
         translations=along("translations"),
         scales=along("scales"),
     )
-    api.write_clip(clip, output)
+    usdhand.write_clip(clip, output)
     return clip
 
 

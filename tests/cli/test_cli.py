@@ -74,9 +74,9 @@ def test_expand_returns_free_channels_and_obeys_the_rig(
 
 
 def test_expand_after_an_edit_moves_the_dependents(run: Run, rig: Path, tmp_path: Path) -> None:
-    from usdhand import verbs as api
+    import usdhand
 
-    stored = api.read_rig(rig)
+    stored = usdhand.read_rig(rig)
     linear = next(r for r in stored.relations if r.kind == "linear")
     controller = linear.controllers[0]
     layer = Sdf.Layer.FindOrOpen(str(rig))
@@ -90,8 +90,8 @@ def test_expand_after_an_edit_moves_the_dependents(run: Run, rig: Path, tmp_path
     layer.Export(str(edited))
     out = tmp_path / "out.usda"
     run("expand", edited, "-o", out)
-    clip = api.read_clip(out)
-    channels = api.find_hands(clip).encode(clip)
+    clip = usdhand.read_clip(out)
+    channels = usdhand.find_hands(clip).encode(clip)
     curve = dict(zip(channels.names, channels.values.T, strict=True))
     np.testing.assert_allclose(curve[controller], np.linspace(10, 20, 47), atol=1e-3)
     expected = linear.offset + linear.slopes[0] * np.linspace(10, 20, 47)

@@ -11,9 +11,9 @@ from builders.cli_runner import edit, run
 from conftest import REPOSITORY
 from pxr import Vt
 
-from usdhand.cli.main import VERBS
 from usdhand.errors import OutputError
 from usdhand.formats import output
+from usdhand.requests.verbs import VERBS
 
 GESTURES = REPOSITORY / "samples" / "gestures"
 OK = GESTURES / "ok_01.usdc"
@@ -111,6 +111,6 @@ def test_swapped_joints_of_a_map_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_examples_of_help_can_be_copied(verb: str) -> None:
-    lines = run(verb, "--help").output.splitlines()
+    lines = run(*verb.split(), "--help").output.splitlines()
     assert not any("\\b" in line for line in lines)
     assert any(line.strip().startswith(("usdhand ", "export ")) for line in lines)

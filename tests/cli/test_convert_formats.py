@@ -11,11 +11,11 @@ import pytest
 from builders.cli_runner import run
 from conftest import REPOSITORY, shared_data
 
+from usdhand import find_hands, read_character, read_clip
 from usdhand.formats.files import animation_names
 from usdhand.formats.usd.check import check_file
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
-from usdhand.verbs import find_hands, read_character, read_clip
 
 SAMPLES = REPOSITORY / "samples"
 TALK = SAMPLES / "conversations" / "talk_01_full.usdc"

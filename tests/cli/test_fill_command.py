@@ -15,16 +15,20 @@ from builders.cli_runner import run
 from conftest import REPOSITORY, shared_data
 from pxr import Sdf, Usd, UsdSkel
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.anatomy import SIDES
 from usdhand.errors import InputError, UsageError
+from usdhand.evaluate.reconstruction import HandError
 from usdhand.fill.library import MotionLibrary
 from usdhand.fill.limits import channel_limits
 from usdhand.fill.settings import PAPER, FillSettings
+from usdhand.formats.usd.library import read_library, write_library
 from usdhand.motion import Clip
 from usdhand.motion.resample import resample
 from usdhand.motion.rotations import Array
-from usdhand.verbs import fill as filling
+from usdhand.verbs.evaluate import measure_library
+from usdhand.verbs.fill import fill_fingers
+from usdhand.verbs.library import build_library
 
 OPEN: list[Usd.Stage] = []  # prims live as long as their stage
 SAMPLES = REPOSITORY / "samples"
@@ -41,12 +45,12 @@ def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def library(library_file: Path) -> MotionLibrary:
-    return filling.read_library(library_file)
+    return read_library(library_file)
 
 
 @pytest.fixture(scope="session")
 def body() -> Clip:
-    return api.read_clip(BODY)
+    return usdhand.read_clip(BODY)
 
 
 def part_of(clip: Clip, frames: slice, fps: float | None = None) -> Clip:
@@ -91,8 +95,8 @@ def test_body_is_untouched_and_report_is_whole(library_file: Path, tmp_path: Pat
             (before.GetTranslationsAttr(), after.GetTranslationsAttr()),
         ):
             assert np.array_equal(np.array(one.Get(time)), np.array(other.Get(time))[places])
-    clip = api.read_clip(out)
-    for frames in api.find_hands(clip).frames.values():
+    clip = usdhand.read_clip(out)
+    for frames in usdhand.find_hands(clip).frames.values():
         assert np.ptp(clip.rotations[:, frames.joints], axis=0).max() > 0.1
     data = json.loads(report.read_text())
     assert data["schema"] == "usdhand.fill/1"
@@ -169,10 +173,10 @@ def test_one_file_keeps_the_alternatives(library_file: Path, tmp_path: Path, suf
 
 
 def test_limits_hold_and_results_repeat(body: Clip, library: MotionLibrary) -> None:
-    filled = filling.fill_fingers(body, library)
-    again = filling.fill_fingers(body, library)
+    filled = fill_fingers(body, library)
+    again = fill_fingers(body, library)
     assert np.array_equal(filled.clips[0].rotations, again.clips[0].rotations)
-    hands = api.find_hands(body)
+    hands = usdhand.find_hands(body)
     for part in filled.parts:
         joints = [hands.frames[s].names for s in part.part]
         low, high = channel_limits(library, part.part, joints)
@@ -192,23 +196,23 @@ def test_the_clip_itself_is_not_used(
     copy = SAMPLES / "gestures" / "ok_01.usdc"
     text = run("fill", copy, "--library", library_file, "-o", tmp_path / "a.usda", "--replace")
     assert "not used, since it is the same clip: ok_01" in text.output
-    clip = api.read_clip(copy)
-    filled = filling.fill_fingers(replace(clip, name="other"), library, replace_motion=True)
+    clip = usdhand.read_clip(copy)
+    filled = fill_fingers(replace(clip, name="other"), library, replace_motion=True)
     assert filled.left_out == ("ok_01",)  # by content
     only = replace(library, clips=tuple(c for c in library.clips if c.name == "ok_01"))
     with pytest.raises(InputError, match="nothing but"):
-        filling.fill_fingers(clip, only, replace_motion=True)
+        fill_fingers(clip, only, replace_motion=True)
 
 
 def test_moving_hands_are_kept_unless_told(library: MotionLibrary) -> None:
-    full = api.read_clip(FULL)
+    full = usdhand.read_clip(FULL)
     with pytest.raises(UsageError, match="already move"):
-        filling.fill_fingers(full, library)
-    hands = api.find_hands(full)
+        fill_fingers(full, library)
+    hands = usdhand.find_hands(full)
     rotations = full.rotations.copy()
     still = hands.frames["left"].joints
     rotations[:, still] = rotations[:1, still]
-    filled = filling.fill_fingers(full.with_rotations(rotations), library)
+    filled = fill_fingers(full.with_rotations(rotations), library)
     assert filled.kept == ("right",)
     assert [p.part for p in filled.parts] == [("left",)]
     right = hands.frames["right"].joints
@@ -220,7 +224,7 @@ def test_moving_hands_are_kept_unless_told(library: MotionLibrary) -> None:
 @pytest.mark.parametrize("fps", [5.0, 12.0, 24.0, 25.0, 59.94, 120.0])
 def test_other_frame_rates(body: Clip, library: MotionLibrary, fps: float) -> None:
     clip = part_of(body, slice(0, 120), fps)
-    filled = filling.fill_fingers(clip, library)
+    filled = fill_fingers(clip, library)
     assert len(filled.clips[0]) == len(clip)
     for part in filled.parts:
         assert part.alternatives[0].curves.shape[0] == len(clip)
@@ -232,11 +236,11 @@ def test_very_short_bodies_are_filled_and_it_is_said(
     body: Clip, library: MotionLibrary, frames: int, fps: float
 ) -> None:
     clip = replace(part_of(body, slice(40, 40 + frames)), fps=fps)
-    filled = filling.fill_fingers(clip, library)
+    filled = fill_fingers(clip, library)
     [choice] = filled.parts[0].alternatives[0].choices
     assert choice.candidates[choice.chosen].stretch != 1.0
     with pytest.raises(InputError, match="single frame"):
-        filling.fill_fingers(part_of(body, slice(0, 1)), library)
+        fill_fingers(part_of(body, slice(0, 1)), library)
 
 
 def test_a_segment_without_candidates_does_not_fail_the_body(
@@ -249,7 +253,7 @@ def test_a_segment_without_candidates_does_not_fail_the_body(
             last = len(hand.arm.wrist) - 1
             hands[side] = replace(hand, segments=((0, last),))
         clips.append(replace(clip, hands=hands))
-    filling.write_library(replace(library, clips=tuple(clips)), tmp_path / "long.usdc")
+    write_library(replace(library, clips=tuple(clips)), tmp_path / "long.usdc")
     out = tmp_path / "a.usda"
     text = run("fill", BODY, "--library", tmp_path / "long.usdc", "-o", out).output
     assert "no segment of like length" in text
@@ -263,26 +267,26 @@ def test_a_segment_without_candidates_does_not_fail_the_body(
 
 def test_libraries_of_one_side(body: Clip, library: MotionLibrary) -> None:
     right = tuple(replace(c, hands={"right": c.hands["right"]}) for c in library.clips)
-    filled = filling.fill_fingers(body, replace(library, clips=right))
+    filled = fill_fingers(body, replace(library, clips=right))
     assert filled.without == ("left",)
     assert [p.part for p in filled.parts] == [("right",)]
     with pytest.raises(InputError, match="left"):
-        filling.fill_fingers(body, replace(library, clips=right), sides=("left",))
+        fill_fingers(body, replace(library, clips=right), sides=("left",))
     halves = [
         replace(c, hands={s: c.hands[s]})
         for c, s in zip(library.clips, ("left", "right") * 32, strict=True)
     ]
     with pytest.raises(InputError, match="without --couple"):
-        filling.fill_fingers(body, replace(library, clips=tuple(halves)), FillSettings(couple=True))
-    coupled = filling.fill_fingers(body, library, FillSettings(couple=True))
+        fill_fingers(body, replace(library, clips=tuple(halves)), FillSettings(couple=True))
+    coupled = fill_fingers(body, library, FillSettings(couple=True))
     assert [p.part for p in coupled.parts] == [("left", "right")]
     with pytest.raises(InputError, match="empty"):
-        filling.fill_fingers(body, replace(library, clips=()))
+        fill_fingers(body, replace(library, clips=()))
 
 
 def test_more_candidates_than_there_are(body: Clip, library: MotionLibrary) -> None:
     few = replace(library, clips=library.clips[:1])
-    filled = filling.fill_fingers(body, few, FillSettings(k=1000, alternatives=2))
+    filled = fill_fingers(body, few, FillSettings(k=1000, alternatives=2))
     assert len(filled.clips) in (1, 2)
 
 
@@ -313,9 +317,9 @@ def test_joints_that_no_library_clip_has_are_kept(
 ) -> None:
     gone = ("ThumbIP", "PinkyDIP")
     few = without_joints(library, gone)
-    filled = filling.fill_fingers(body, few)
+    filled = fill_fingers(body, few)
     assert filled.missing == {"left": gone, "right": gone}
-    frames = api.find_hands(body).frames
+    frames = usdhand.find_hands(body).frames
     kept = [
         int(j) for f in frames.values() for n, j in zip(f.names, f.joints, strict=True) if n in gone
     ]
@@ -323,12 +327,12 @@ def test_joints_that_no_library_clip_has_are_kept(
     assert set(filled.changed) == {int(j) for f in frames.values() for j in f.joints} - set(kept)
     assert np.ptp(filled.clips[0].rotations[:, list(filled.changed)], axis=0).max() > 0.1
     path = tmp_path / "few.usdc"
-    filling.write_library(few, path)
+    write_library(few, path)
     out = tmp_path / "o.usda"
     text = run("fill", BODY, "--library", path, "-o", out).output
     assert "no clip of the library has ThumbIP, PinkyDIP of the left hand" in text
-    take = api.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
-    errors, left = filling.measure_library(few, SAMPLES, FillSettings(), takes=[take])
+    take = usdhand.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
+    errors, left = measure_library(few, SAMPLES, FillSettings(), takes=[take])
     assert not left
     assert all(np.isfinite(e.degrees) for e in errors)
 
@@ -340,7 +344,7 @@ def test_one_clip_of_a_richer_rig_does_not_switch_off_the_others(
     few = without_joints(library, gone)
     mixed = replace(few, clips=(*few.clips[:-1], library.clips[-1]))
     path, out = tmp_path / "mixed.usdc", tmp_path / "o.usda"
-    filling.write_library(mixed, path)
+    write_library(mixed, path)
     text = run("fill", BODY, "--library", path, "-o", out).output
     data = json.loads(
         run("fill", BODY, "--library", path, "-n", "-o", tmp_path / "n.usda", "--json").stdout
@@ -351,10 +355,10 @@ def test_one_clip_of_a_richer_rig_does_not_switch_off_the_others(
     assert data["missing"] == {"left": list(gone), "right": list(gone)}
     assert data["set_aside"] == {}
     rich = replace(few, clips=(few.clips[0], *library.clips[1:]))  # one poorer clip is set aside
-    filled = filling.fill_fingers(body, rich)
+    filled = fill_fingers(body, rich)
     assert filled.missing == {}
     assert filled.set_aside == dict.fromkeys(SIDES, (library.clips[0].name,))
-    filling.write_library(rich, path, force=True)
+    write_library(rich, path, force=True)
     text = run("fill", BODY, "--library", path, "-n", "-o", tmp_path / "n.usda").output
     assert "left hand: 1 clip of the library set aside for lack of joints" in text
     assert library.clips[0].name in text
@@ -372,13 +376,13 @@ def test_both_hands_as_one_have_figures_of_their_own(library_file: Path, tmp_pat
 
 def test_a_body_without_motion(body: Clip, library: MotionLibrary) -> None:
     still = body.with_rotations(np.repeat(body.rotations[:1], len(body), axis=0))
-    filled = filling.fill_fingers(still, library)
+    filled = fill_fingers(still, library)
     made = filled.clips[0].rotations
     assert np.isfinite(made).all()
     assert filled.still == SIDES
     assert np.array_equal(made, np.repeat(made[:1], len(made), axis=0))
     assert not np.array_equal(made[0], body.rotations[0])  # a pose of the library, not the body's
-    assert filling.fill_fingers(body, library).still == ()
+    assert fill_fingers(body, library).still == ()
 
 
 def damaged(source: Path, target: Path, joint: str, value: float) -> Path:
@@ -407,7 +411,7 @@ def test_clips_of_absurd_size_are_refused(tmp_path: Path, value: float, joint: s
     text = run("library", "build", bad, gestures / "ok_02.usdc", "-o", library).output
     assert "left out: bad_01.usdc: joint " in text
     assert f"{joint} is {value:.3g} cm from its parent" in text
-    assert [c.name for c in filling.read_library(library).clips] == ["ok_02"]
+    assert [c.name for c in read_library(library).clips] == ["ok_02"]
     run("fill", BODY, "--library", library, "-o", out, "-q")
     body = damaged(BODY, tmp_path / "body.usdc", joint, value)
     text = run("fill", body, "--library", library, "-o", tmp_path / "n.usda", code=3).output
@@ -444,7 +448,7 @@ def test_wrong_inputs_are_refused(library_file: Path, tmp_path: Path, wrong: str
 
 
 def test_paper_preset(body: Clip, library: MotionLibrary) -> None:
-    filled = filling.fill_fingers(part_of(body, slice(0, 200)), library, PAPER)
+    filled = fill_fingers(part_of(body, slice(0, 200)), library, PAPER)
     assert np.isfinite(filled.clips[0].rotations).all()
 
 
@@ -471,17 +475,17 @@ def test_evaluate_on_the_samples(library_file: Path) -> None:
 def test_held_out_real_takes() -> None:
     """Every third take, which no setting was chosen on, filled from all others."""
     files = sorted(shared_data("studiogalt", "full").glob("*.usdc"))
-    library = filling.build_library(files, Path("library.usdc").absolute()).library
-    takes = [api.read_clip(f) for f in files[2::3]]
+    library = build_library(files, Path("library.usdc").absolute()).library
+    takes = [usdhand.read_clip(f) for f in files[2::3]]
 
     def error(settings: FillSettings, method: str, side: str) -> float:
         key = (settings.metric, settings.pool)
         if key not in measured:
-            measured[key] = filling.measure_library(library, Path(), settings, takes=takes)[0]
+            measured[key] = measure_library(library, Path(), settings, takes=takes)[0]
         own = [e for e in measured[key] if e.side == side and e.method == method]
         return float(np.average([e.degrees for e in own], weights=[e.frames for e in own]))
 
-    measured: dict[tuple[str, int], list[filling.HandError]] = {}
+    measured: dict[tuple[str, int], list[HandError]] = {}
     for side in ("left", "right"):
         ours = error(FillSettings(), "fill", side)
         print(side, ours, error(PAPER, "fill", side), error(FillSettings(), "mean pose", side))
@@ -509,7 +513,7 @@ def test_a_body_that_starts_late_is_filled_in_its_own_time(
     late = json.loads(run("fill", shifted, "-o", out, *arguments).stdout)
     usual = json.loads(run("fill", BODY, "-o", tmp_path / "usual.usda", *arguments).stdout)
     assert late["hands"] == usual["hands"]  # seconds from the first frame
-    one, other = api.read_clip(out), api.read_clip(tmp_path / "usual.usda")
+    one, other = usdhand.read_clip(out), usdhand.read_clip(tmp_path / "usual.usda")
     assert one.time_codes[0] == 1001.0
     assert one.time_codes[-1] == other.time_codes[-1] + 1000
     assert np.array_equal(one.rotations, other.rotations)
@@ -526,7 +530,7 @@ def test_threads_make_no_difference(body: Clip, library: MotionLibrary) -> None:
     for threads in (1, 2, 2):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(candidates, "search", partial(search, threads=threads))
-            results.append(filling.fill_fingers(clip, library).clips[0].rotations)
+            results.append(fill_fingers(clip, library).clips[0].rotations)
     assert all(np.array_equal(results[0], other) for other in results[1:])
 
     def in_shards(_: object, asked: PackedSegments, k: int, **more: Any) -> Any:
@@ -543,8 +547,8 @@ def test_threads_make_no_difference(body: Clip, library: MotionLibrary) -> None:
         patch.setattr(candidates, "search", in_shards)
         for side in SIDES:
             current = [side]
-            one = filling.fill_fingers(clip, library, sides=(side,)).clips[0].rotations
-            joints = api.find_hands(clip).frames[side].joints
+            one = fill_fingers(clip, library, sides=(side,)).clips[0].rotations
+            joints = usdhand.find_hands(clip).frames[side].joints
             assert np.array_equal(one[:, joints], results[0][:, joints])
 
 
@@ -553,7 +557,7 @@ def test_people_of_other_build_gesture_alike(library: MotionLibrary) -> None:
     from usdhand.fill.candidates import find_candidates, part_rows, part_segments
     from usdhand.fill.method import space_for
 
-    ben = filling.build_library(
+    ben = build_library(
         sorted((SAMPLES / "gestures_ben").glob("*.usdc")), Path("ben.usdc").absolute()
     ).library
     space = space_for(library, ("right",), FillSettings())
@@ -579,15 +583,15 @@ def test_the_truth_in_the_library_comes_back(
     from usdhand.fill import method
 
     monkeypatch.setattr(method, "same_motion", lambda *_: [])
-    clip = api.read_clip(SAMPLES / "gestures" / "wipe_01.usdc")
-    filled = filling.fill_fingers(clip, library, FillSettings(k=1, pool=0), replace_motion=True)
+    clip = usdhand.read_clip(SAMPLES / "gestures" / "wipe_01.usdc")
+    filled = fill_fingers(clip, library, FillSettings(k=1, pool=0), replace_motion=True)
     used = {
         library.clips[p.space.clips[c.candidates[c.chosen].segment]].name
         for p in filled.parts
         for c in p.alternatives[0].choices
     }
     assert used == {"wipe_01"}
-    hands = api.find_hands(clip)
+    hands = usdhand.find_hands(clip)
     truth, found = hands.encode(clip).values, hands.encode(filled.clips[0]).values
     assert np.sqrt(np.mean((truth - found) ** 2)) < 0.3
 
@@ -602,11 +606,11 @@ def test_evaluate_has_the_known_answer(tmp_path: Path) -> None:
     library = tmp_path / "l.usdc"
     clips = [SAMPLES / "gestures" / f"{name}_01.usdc" for name in ("ok", "wipe")]
     run("library", "build", *clips, "-o", library, "-q")
-    motions = filling.read_library(library)
+    motions = read_library(library)
     twins = tuple(
         replace(c, name=c.name.replace("_01", "_02"), content_hash="") for c in motions.clips
     )
-    filling.write_library(replace(motions, clips=(*motions.clips, *twins)), library, force=True)
+    write_library(replace(motions, clips=(*motions.clips, *twins)), library, force=True)
     broken = tmp_path / "broken.usda"
     broken.write_text("#usda 1.0\n")
     with pytest.MonkeyPatch.context() as patch:

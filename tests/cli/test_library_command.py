@@ -17,7 +17,8 @@ from pxr import Sdf, Usd
 
 from usdhand.errors import InputError
 from usdhand.fill.library import MotionLibrary
-from usdhand.verbs import fill as filling
+from usdhand.formats.usd.library import read_library, write_library
+from usdhand.verbs.library import build_library
 
 GESTURES = REPOSITORY / "samples" / "gestures"
 CHARACTERS = REPOSITORY / "samples" / "characters"
@@ -66,9 +67,9 @@ def assert_same(a: MotionLibrary, b: MotionLibrary) -> None:
 
 def test_round_trip(folder: Path) -> None:
     paths = sorted((folder / "gestures").iterdir())
-    built = filling.build_library(paths, folder / "library.usda").library
-    filling.write_library(built, folder / "library.usda")
-    read = filling.read_library(folder / "library.usda")
+    built = build_library(paths, folder / "library.usda").library
+    write_library(built, folder / "library.usda")
+    read = read_library(folder / "library.usda")
     assert_same(built, read)
     assert read.segmentation == built.segmentation
     assert [c.label for c in read.clips] == ["big", "ok", "ok", "wipe"]
@@ -85,14 +86,14 @@ def test_only_what_changed_is_read_again(folder: Path) -> None:
 
 
 def test_other_segments_need_no_reading(folder: Path, library: Path) -> None:
-    before = filling.read_library(library)
+    before = read_library(library)
     assert build(folder, "--longest", 1)["read"] == 0
-    after = filling.read_library(library)
+    after = read_library(library)
     assert sum(len(c.hands["left"].segments) for c in after.clips) < sum(
         len(c.hands["left"].segments) for c in before.clips
     )
     run("library", "build", folder / "gestures", "-o", folder / "new.usdc", "--longest", 1)
-    assert_same(after, filling.read_library(folder / "new.usdc"))
+    assert_same(after, read_library(folder / "new.usdc"))
 
 
 def test_what_someone_edited_stays(folder: Path, library: Path) -> None:
@@ -101,15 +102,15 @@ def test_what_someone_edited_stays(folder: Path, library: Path) -> None:
     stage.RemovePrim("/Library/Clips/big_01")
     stage.Save()
     del stage
-    assert [c.label for c in filling.read_library(library).clips] == ["ok", "circle", "wipe"]
+    assert [c.label for c in read_library(library).clips] == ["ok", "circle", "wipe"]
     (folder / "gestures" / "ok_01.usdc").rename(folder / "gestures" / "fine_01.usdc")
     build(folder)
-    clips = filling.read_library(library).clips
+    clips = read_library(library).clips
     assert [c.label for c in clips] == ["big", "fine", "circle", "wipe"]
 
 
 def words(library: Path) -> dict[str, tuple[str, str]]:
-    return {c.name: (c.label, c.actor) for c in filling.read_library(library).clips}
+    return {c.name: (c.label, c.actor) for c in read_library(library).clips}
 
 
 def test_hand_work_outlives_changed_files_and_rebuild(folder: Path, library: Path) -> None:
@@ -157,7 +158,7 @@ def test_labels_from_a_table(folder: Path) -> None:
         "file,label,actor\nok_01,circle,Ada\ngestures/big_01.usdc,wide,\n", "utf-8-sig"
     )
     build(folder, "--labels", table)
-    clips = filling.read_library(folder / "library.usdc").clips
+    clips = read_library(folder / "library.usdc").clips
     assert [(c.label, c.actor) for c in clips[:3]] == [("wide", ""), ("circle", "Ada"), ("ok", "")]
     table.write_text("file,label,colour\nok_01,circle,red\n")
     arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
@@ -174,9 +175,9 @@ def test_a_broken_clip_is_left_out(folder: Path) -> None:
     text = run("library", "build", folder / "gestures", "-o", folder / "library.usdc").output
     assert "left out: gestures/broken_01.usdc" in text
     assert text.count("broken_01.usdc") == 1
-    read = filling.read_library(folder / "library.usdc")
+    read = read_library(folder / "library.usdc")
     assert len(read.clips) == 4
-    assert [x.path for x in read.left_out] == ["gestures/broken_01.usdc"]
+    assert [x.file for x in read.left_out] == ["gestures/broken_01.usdc"]
 
 
 def test_no_clip_at_all(folder: Path) -> None:
@@ -210,27 +211,25 @@ def test_same_names_and_odd_names(folder: Path) -> None:
         (folder / place).mkdir(exist_ok=True)
         shutil.copy(GESTURES / "ok_03.usdc", folder / place / f"{name}.usdc")
     run("library", "build", folder / "a", folder / "b", "-o", folder / "library.usdc")
-    clips = filling.read_library(folder / "library.usdc").clips
+    clips = read_library(folder / "library.usdc").clips
     assert [c.name for c in clips] == ["1", "a_ok_01", "b_ok_01", "gräß 1", "grüß 1"]
     assert len({c.path for c in clips}) == 5
 
 
 def test_two_processes_give_the_same(folder: Path, library: Path) -> None:
     run("library", "build", folder / "gestures", "-o", folder / "two.usdc", "--jobs", 2)
-    assert_same(filling.read_library(library), filling.read_library(folder / "two.usdc"))
+    assert_same(read_library(library), read_library(folder / "two.usdc"))
 
 
 def test_an_interrupted_build_goes_on(folder: Path) -> None:
     paths, output = sorted((folder / "gestures").iterdir()), folder / "library.usdc"
 
-    def interrupted(items, _):  # type: ignore[no-untyped-def]
-        for number, item in enumerate(items):
-            if number == 2:
-                raise KeyboardInterrupt
-            yield item
+    def interrupted(done: int, _: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        filling.build_library(paths, output, progress=interrupted)
+        build_library(paths, output, progress=interrupted)
     assert not output.exists()
     assert (build(folder)["read"], sorted(p.name for p in folder.glob(".*"))) == (2, [])
 
@@ -252,17 +251,17 @@ def edit_prim(library: Path, name: str, value: object) -> None:
 def test_a_library_of_another_version_is_refused(library: Path) -> None:
     edit_prim(library, ".usdhand:libraryVersion", 99)
     with pytest.raises(InputError, match=r"version 99.*--rebuild"):
-        filling.read_library(library)
+        read_library(library)
     gesture = library.parent / "gestures" / "ok_01.usdc"
     again = library.with_name("again.usdc")
     shutil.copy(library, again)
     run("library", "build", gesture, "-o", again, code=3)
     assert "are lost" in run("library", "build", gesture, "-o", again, "--rebuild").output
-    assert len(filling.read_library(again).clips) == 1
+    assert len(read_library(again).clips) == 1
     edit_prim(library, ".usdhand:libraryVersion", 1)
     edit_prim(library, ".usdhand:segmentation:speed", -1.0)
     with pytest.raises(InputError, match="segmentation"):
-        filling.read_library(library)
+        read_library(library)
 
 
 @pytest.mark.parametrize(
@@ -284,9 +283,9 @@ def test_a_library_of_another_version_is_refused(library: Path) -> None:
 )
 def test_a_damaged_clip_is_left_out_and_listed(library: Path, name: str, value: object) -> None:
     edit_prim(library, f"/Clips/ok_01.usdhand:{name}", value)
-    read = filling.read_library(library)
+    read = read_library(library)
     assert [c.name for c in read.clips] == ["big_01", "ok_02", "wipe_01"]
-    assert [entry.path for entry in read.damaged] == ["/Library/Clips/ok_01"]
+    assert [entry.file for entry in read.damaged] == ["/Library/Clips/ok_01"]
     text = run("library", "info", library).output
     assert "cannot be used: /Library/Clips/ok_01: " in text
 
@@ -304,22 +303,22 @@ def test_not_a_number_and_foreign_prims(folder: Path, library: Path) -> None:
         stage.GetPrimAtPath(f"/Library/Clips/{name}").SetActive(False)
     stage.Save()
     del stage
-    read = filling.read_library(library)
+    read = read_library(library)
     assert [c.name for c in read.clips] == ["ok_02"]
-    reasons = {entry.path: entry.reason for entry in read.damaged}
+    reasons = {entry.file: entry.message for entry in read.damaged}
     assert "no usdhand:name" in reasons["/Library/Clips/Camera"]
     assert "no numbers" in reasons["/Library/Clips/ok_01"]
     body = REPOSITORY / "samples" / "conversations" / "talk_01_body.usdc"
     text = run("fill", body, "--library", library, "-o", library.parent / "o.usda").output
     assert "/Library/Clips/ok_01 of the library cannot be used" in text
     assert build(folder)["read"] == 3  # what is damaged is read again
-    assert filling.read_library(library).damaged == ()
+    assert read_library(library).damaged == ()
     stage = Usd.Stage.Open(str(library))
     for prim in stage.GetPrimAtPath("/Library/Clips").GetChildren():
         prim.GetAttribute("usdhand:duration").Set(0.0)
     stage.Save()
     with pytest.raises(InputError, match="none of its 4 clips"):
-        filling.read_library(library)
+        read_library(library)
 
 
 def test_folders_in_folders(folder: Path) -> None:
@@ -330,7 +329,7 @@ def test_folders_in_folders(folder: Path) -> None:
         flat.Export(str(folder / "gestures" / place / "small_03.usdc"))
     built = build(folder)
     assert built["clips"] == 5
-    clips = filling.read_library(folder / "library.usdc").clips
+    clips = read_library(folder / "library.usdc").clips
     assert clips[3].path == "gestures/more/deep/small_03.usdc"
     again = run("library", "build", folder, "-o", folder / "library.usdc", "--json")
     left = {x["path"]: x["reason"] for x in json.loads(again.stdout)["left_out"]}
@@ -355,33 +354,33 @@ def test_labels_without_a_clip_are_reported(folder: Path) -> None:
 
 
 def test_an_interruption_says_what_was_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from usdhand.cli import library as verb
+    from usdhand.verbs import library as verb
 
-    def interrupted(items, _):  # type: ignore[no-untyped-def]
+    def interrupted(items, *_):  # type: ignore[no-untyped-def]
         for number, item in enumerate(items):
             if number == 2:
                 raise KeyboardInterrupt
             yield item
 
-    monkeypatch.setattr(verb, "_progress", interrupted)
+    monkeypatch.setattr(verb, "each", interrupted)
     arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
-    text = run(*arguments, code=1).output
+    text = run(*arguments, code=130).output
     assert "2 clips read so far are kept" in text
     monkeypatch.undo()
     assert build(folder)["read"] == 2
 
 
 def test_sigterm_is_an_interruption_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from usdhand.cli import library as verb
+    from usdhand.verbs import library as verb
 
-    def terminated(items, _):  # type: ignore[no-untyped-def]
+    def terminated(items, *_):  # type: ignore[no-untyped-def]
         for number, item in enumerate(items):
             if number == 2:
                 os.kill(os.getpid(), signal.SIGTERM)
             yield item
 
     before = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr(verb, "_progress", terminated)
+    monkeypatch.setattr(verb, "each", terminated)
     arguments = ("library", "build", folder / "gestures", "-o", folder / "library.usdc")
     assert "2 clips read so far are kept" in run(*arguments, code=143).output
     assert signal.getsignal(signal.SIGTERM) is before

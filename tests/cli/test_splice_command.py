@@ -12,12 +12,12 @@ import pytest
 from click.testing import CliRunner, Result
 from conftest import REPOSITORY
 from pxr import Usd
-from usdhand.cli.splice import command
 
+from usdhand import find_hands, read_clip
+from usdhand.cli.command import command_of
 from usdhand.errors import HandNotFoundError, InputError, UsageError, UsdHandError
 from usdhand.motion import Clip, Skeleton
 from usdhand.splice.settings import SpliceSettings
-from usdhand.verbs import find_hands, read_clip
 from usdhand.verbs.splice import parse_pin, splice_hands
 
 SAMPLES = REPOSITORY / "samples"
@@ -33,7 +33,7 @@ Run = Callable[..., Result]
 @pytest.fixture
 def run() -> Run:
     def call(*arguments: object, code: int = 0) -> Result:
-        result = CliRunner().invoke(command, [str(a) for a in arguments])
+        result = CliRunner().invoke(command_of("splice"), [str(a) for a in arguments])
         if isinstance(result.exception, UsdHandError):
             assert result.exception.exit_code == code, result.exception
             return result
@@ -123,7 +123,7 @@ def test_refused_with_a_reason(
 ) -> None:
     out = tmp_path / "o.usda"
     result = run(BODY, HANDS, *arguments, "-o", out, code=2)
-    assert message in str(result.exception)
+    assert message in str(result.exception) + result.output
     assert not out.exists()
 
 

@@ -12,7 +12,8 @@ from click.testing import CliRunner
 from conftest import REPOSITORY
 
 from usdhand.cli import main
-from usdhand.cli.main import VERBS
+from usdhand.cli.command import command_of
+from usdhand.requests.verbs import VERBS
 
 REFERENCE = (REPOSITORY / "docs" / "command-line.md").read_text(encoding="utf-8")
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
@@ -20,15 +21,7 @@ PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 
 def commands() -> list[tuple[str, click.Command]]:
     """Verbs, those with verbs of their own included, as (section of the reference, command)."""
-    context = click.Context(main)
-    found = [(verb, main.get_command(context, verb)) for verb in VERBS]
-    inner = [
-        (verb, sub)
-        for verb, command in found
-        if isinstance(command, click.Group)
-        for sub in command.commands.values()
-    ]
-    return [(verb, c) for verb, c in (*found, *inner) if c is not None]
+    return [(verb.split()[0], command_of(verb)) for verb in VERBS]
 
 
 @pytest.mark.parametrize(("verb", "command"), commands())

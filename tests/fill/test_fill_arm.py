@@ -10,7 +10,7 @@ from builders.moving_hands import moved, random_turns, skeleton
 from conftest import REPOSITORY
 from numpy.testing import assert_allclose
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.errors import HandNotFoundError
 from usdhand.fill.arm import (
     ArmMotion,
@@ -32,8 +32,8 @@ def assert_alike(a: ArmMotion, b: ArmMotion, tolerance: float = 1e-6) -> None:
 
 
 def test_mirrored_twice_is_the_same() -> None:
-    clip = api.read_clip(SAMPLES / "gestures" / "wipe_01.usdc")
-    arm = arm_motion(clip, api.find_hands(clip), "left")
+    clip = usdhand.read_clip(SAMPLES / "gestures" / "wipe_01.usdc")
+    arm = arm_motion(clip, usdhand.find_hands(clip), "left")
     assert_alike(mirrored(mirrored(arm)), arm)
 
 
@@ -45,14 +45,14 @@ def test_joint_axes_and_rest_make_no_difference(axes: int) -> None:
         rig, index = skeleton(axes=seed)
         clip = moved(rig, index, turns)
         try:
-            results.append(arm_motion(clip, api.find_hands(clip), "left"))
+            results.append(arm_motion(clip, usdhand.find_hands(clip), "left"))
         except HandNotFoundError:
             pytest.skip("the rig's names tell no hand")
     assert_alike(*results)
 
 
 def test_size_makes_no_difference() -> None:
-    clip = api.read_clip(SAMPLES / "gestures" / "big_01.usdc")
+    clip = usdhand.read_clip(SAMPLES / "gestures" / "big_01.usdc")
     rig = clip.skeleton
     bind, rest = rig.bind.copy(), rig.rest.copy()
     bind[:, :3, 3] *= 1.3
@@ -63,8 +63,8 @@ def test_size_makes_no_difference() -> None:
         translations=clip.translations * 1.3,
     )
     for side in ("left", "right"):
-        one = arm_motion(clip, api.find_hands(clip), side)
-        other = arm_motion(larger, api.find_hands(larger), side)
+        one = arm_motion(clip, usdhand.find_hands(clip), side)
+        other = arm_motion(larger, usdhand.find_hands(larger), side)
         assert_alike(one, other)
 
 
@@ -72,7 +72,7 @@ def test_the_other_hand_is_the_mirror_image() -> None:
     rig, index = skeleton()
     clip = moved(rig, index, random_turns(20, 7))
     try:
-        hands = api.find_hands(clip)
+        hands = usdhand.find_hands(clip)
     except HandNotFoundError:
         pytest.skip("the rig's names tell no hand")
     assert_alike(mirrored(arm_motion(clip, hands, "left")), arm_motion(clip, hands, "right"))
@@ -81,8 +81,8 @@ def test_the_other_hand_is_the_mirror_image() -> None:
 @pytest.mark.parametrize("name", ["ada_hands", "ada_hand_right"])
 def test_hands_alone_work(name: str) -> None:
     files = sorted((SAMPLES / "hands").glob("*right*" if "right" in name else "*hands_a*"))
-    clip = api.read_clip(files[0])
-    hands = api.find_hands(clip)
+    clip = usdhand.read_clip(files[0])
+    hands = usdhand.find_hands(clip)
     for side in hands.frames:
         arm: Array = arm_motion(clip, hands, side).hips_position
         assert np.isfinite(arm).all()
@@ -90,8 +90,8 @@ def test_hands_alone_work(name: str) -> None:
 
 def test_a_body_in_one_place_has_the_reference_height() -> None:
     """Instead of none, by which everything would be divided."""
-    clip = api.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
-    hands = api.find_hands(clip)
+    clip = usdhand.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
+    hands = usdhand.find_hands(clip)
     bind = clip.skeleton.bind.copy()
     bind[:, :3, 3] *= 1e-6
     assert body_height(replace(clip.skeleton, bind=bind), hands.character) == REFERENCE_HEIGHT_CM

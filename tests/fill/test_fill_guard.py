@@ -13,7 +13,7 @@ import pytest
 from builders.cli_runner import run
 from conftest import REPOSITORY, shared_data
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.anatomy import Side
 from usdhand.fill.arm import ArmMotion, arm_motion
 from usdhand.fill.library import MotionLibrary, at_arm_rate, library_clip
@@ -113,20 +113,20 @@ def test_a_body_without_finger_joints_is_told_so(tmp_path: Path) -> None:
 
 def test_the_same_performance_on_a_body_of_other_proportions_is_left_out() -> None:
     """Its wrists go elsewhere, its hands turn alike; a take that only stands still does neither."""
-    body = api.read_clip(TALKS / "talk_01_body.usdc")
+    body = usdhand.read_clip(TALKS / "talk_01_body.usdc")
     longer = body.translations.copy()
     names = body.skeleton.names
     longer[:, [i for i, n in enumerate(names) if "Arm" in n or n.endswith("Hand")]] *= 1.4
-    twin = api.read_clip(TALKS / "talk_01_full.usdc")
+    twin = usdhand.read_clip(TALKS / "talk_01_full.usdc")
     entry = library_clip(
-        twin, api.find_hands(twin), Segmentation(), path="a.usdc", content_hash="1"
+        twin, usdhand.find_hands(twin), Segmentation(), path="a.usdc", content_hash="1"
     )
-    other = api.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
+    other = usdhand.read_clip(SAMPLES / "gestures" / "ok_01.usdc")
     second = library_clip(
-        other, api.find_hands(other), Segmentation(), path="b.usdc", content_hash="2"
+        other, usdhand.find_hands(other), Segmentation(), path="b.usdc", content_hash="2"
     )
     library = MotionLibrary((entry, second))
-    hands = api.find_hands(body)
+    hands = usdhand.find_hands(body)
 
     def arms(clip: Clip) -> dict[Side, ArmMotion]:
         return {s: at_arm_rate(arm_motion(clip, hands, s), clip.fps) for s in hands.frames}
@@ -141,8 +141,8 @@ def test_the_same_performance_on_a_body_of_other_proportions_is_left_out() -> No
 @pytest.mark.parametrize("frames", [slice(0, 90), slice(150, 300), slice(30, 61)])
 def test_an_excerpt_is_the_same_performance(frames: slice) -> None:
     """A piece of a take is told to be of it, and not of others; and the other way round."""
-    whole = [api.read_clip(TALKS / f"talk_0{i}_full.usdc") for i in (1, 2, 3)]
-    hands = api.find_hands(whole[0])
+    whole = [usdhand.read_clip(TALKS / f"talk_0{i}_full.usdc") for i in (1, 2, 3)]
+    hands = usdhand.find_hands(whole[0])
 
     def piece(clip: Clip) -> Clip:
         return replace(
@@ -172,17 +172,17 @@ def test_the_same_takes_on_two_rigs() -> None:
     entries = []
     for path in full:
         if path.stem in names or path.stem < "SG_ASL_Abe":
-            clip = api.read_clip(path)
+            clip = usdhand.read_clip(path)
             entries.append(
                 library_clip(
-                    clip, api.find_hands(clip), Segmentation(), path=path.name, content_hash=""
+                    clip, usdhand.find_hands(clip), Segmentation(), path=path.name, content_hash=""
                 )
             )
     library = MotionLibrary(tuple(entries))
     for path in mini:
         if path.stem in names:
-            clip = api.read_clip(path)
-            hands = api.find_hands(clip)
+            clip = usdhand.read_clip(path)
+            hands = usdhand.find_hands(clip)
             arms = {s: at_arm_rate(arm_motion(clip, hands, s), clip.fps) for s in hands.frames}
             found = same_motion(library, arms, None)
             assert [library.clips[i].name for i in found] == [path.stem]

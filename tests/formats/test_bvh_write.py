@@ -12,7 +12,7 @@ from conftest import REPOSITORY, shared_data
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.formats.bvh.euler import zxy_angles
 from usdhand.formats.bvh.motion import from_euler
 from usdhand.formats.bvh.read import read_character, read_clip
@@ -71,7 +71,7 @@ def there_and_back(clip: Clip, folder: Path, **told: object) -> tuple[Clip, tupl
 @pytest.mark.parametrize("up", ["Y", "Z"])
 @pytest.mark.parametrize("name", SAMPLES)
 def test_samples_come_back(tmp_path: Path, name: str, up: str) -> None:
-    clip = api.read_clip(REPOSITORY / "samples" / f"{name}.usdc")
+    clip = usdhand.read_clip(REPOSITORY / "samples" / f"{name}.usdc")
     back, _ = there_and_back(clip, tmp_path, up=up)
     assert back.origin.cm_per_unit == 1.0
     assert_same(clip, back)
@@ -82,7 +82,7 @@ def test_samples_come_back(tmp_path: Path, name: str, up: str) -> None:
 @pytest.mark.real_data
 @pytest.mark.parametrize("name", REAL)
 def test_real_takes_come_back(tmp_path: Path, name: str) -> None:
-    clip = api.read_clip(shared_data(*name.split("/")))
+    clip = usdhand.read_clip(shared_data(*name.split("/")))
     back, problems = there_and_back(clip, tmp_path)  # units and axes guessed from our own file
     assert (back.origin.cm_per_unit, back.origin.up_axis) == (1.0, "Y")
     assert_same(clip, back)
@@ -106,7 +106,7 @@ def test_real_files_come_back(tmp_path: Path, name: str, up: str) -> None:
 
 @pytest.mark.real_data
 def test_hands_are_found_again(tmp_path: Path) -> None:
-    clip = api.read_clip(shared_data(*REAL[0].split("/")))
+    clip = usdhand.read_clip(shared_data(*REAL[0].split("/")))
     back, _ = there_and_back(clip, tmp_path)
 
     def names(which: Clip) -> dict[str, dict[str, str]]:
@@ -174,7 +174,7 @@ def arm(folder: Path) -> Clip:
 
 
 def test_zero_is_the_bind_pose(tmp_path: Path) -> None:
-    clip = api.read_clip(REPOSITORY / "samples" / "gestures" / "ok_02.usdc")
+    clip = usdhand.read_clip(REPOSITORY / "samples" / "gestures" / "ok_02.usdc")
     write_clip(clip, tmp_path / "out.bvh")
     text = (tmp_path / "out.bvh").read_text()
     rows = text[text.index("MOTION") :].splitlines()[3:]
@@ -232,7 +232,7 @@ def test_names_are_those_of_the_file_each_once(tmp_path: Path) -> None:
 
 
 def test_a_plain_reader_reads_what_we_write(tmp_path: Path) -> None:
-    clip = api.read_clip(REPOSITORY / "samples" / "gestures" / "big_03.usdc")
+    clip = usdhand.read_clip(REPOSITORY / "samples" / "gestures" / "big_03.usdc")
     write_clip(clip, tmp_path / "out.bvh")
     back = read_clip(tmp_path / "out.bvh", up="Y", cm_per_unit=1.0)
     frames = [0, len(clip) // 2, len(clip) - 1]

@@ -285,8 +285,8 @@ def test_what_is_no_usd_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_finding_as_a_sentence() -> None:
-    assert str(Problem("code", "it is wrong", "/A", "error")) == "error: it is wrong (/A) [code]"
-    assert str(Problem("code", "it is odd", severity="warning")) == "warning: it is odd [code]"
+    assert str(Problem("code", "it is wrong", "/A", "error")) == "it is wrong (/A)"
+    assert str(Problem("code", "it is odd")) == "it is odd"
 
 
 @pytest.mark.real_data

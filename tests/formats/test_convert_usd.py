@@ -14,13 +14,13 @@ from conftest import REPOSITORY, shared_data
 from oracles.usdskel import assert_same_world
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
+from usdhand import find_hands, read_clip, retarget_hands, write_new
 from usdhand.errors import HandNotFoundError
 from usdhand.formats.usd.character import character_of, legal_clip
 from usdhand.formats.usd.check import check_file
 from usdhand.motion import Clip, forward_kinematics, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.rigs import map_character
-from usdhand.verbs import find_hands, read_clip, retarget_hands, write_new
 
 TALK = REPOSITORY / "samples" / "conversations" / "talk_01_full.usdc"
 BEN = REPOSITORY / "samples" / "characters" / "ben.usdc"

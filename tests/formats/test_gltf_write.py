@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY, shared_data
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.errors import InputError
 from usdhand.formats.gltf.read import read_clip
 from usdhand.formats.gltf.write import write_clip
@@ -32,7 +32,7 @@ TAKES = (
 
 
 def sample(name: str = SAMPLES[0]) -> Clip:
-    return api.read_clip(REPOSITORY / "samples" / f"{name}.usdc")
+    return usdhand.read_clip(REPOSITORY / "samples" / f"{name}.usdc")
 
 
 def content(path: Path) -> dict:
@@ -85,7 +85,7 @@ def test_samples_come_back(name: str, suffix: str, tmp_path: Path) -> None:
 @pytest.mark.real_data
 @pytest.mark.parametrize("take", TAKES)
 def test_real_takes_come_back(take: tuple[str, ...], tmp_path: Path) -> None:
-    assert_comes_back(api.read_clip(shared_data(*take)), tmp_path / "take.glb")
+    assert_comes_back(usdhand.read_clip(shared_data(*take)), tmp_path / "take.glb")
 
 
 def test_what_stands_still_is_written_once(tmp_path: Path) -> None:
@@ -277,6 +277,6 @@ def test_blender_makes_an_armature(name: str, suffix: str, tmp_path: Path) -> No
 @pytest.mark.real_data
 @pytest.mark.parametrize("take", TAKES)
 def test_blender_shows_real_takes(take: tuple[str, ...], tmp_path: Path) -> None:
-    clip = api.read_clip(shared_data(*take))
+    clip = usdhand.read_clip(shared_data(*take))
     write_clip(clip, tmp_path / "take.glb")
     assert_same_in_blender(clip, tmp_path / "take.glb", tmp_path)

@@ -12,7 +12,7 @@ import pytest
 from conftest import REPOSITORY
 from pxr import Sdf
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.formats.schema import schema_folder
 from usdhand.formats.usd.rig import CHANNEL_PREFIX
 from usdhand.reduce.settings import ReduceSettings
@@ -36,9 +36,9 @@ print(json.dumps({
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("schema") / "rig.usda"
-    clip = api.read_clip(REPOSITORY / "samples" / "gestures" / "turn_01.usdc")
-    [reduction] = api.reduce_hands([clip], ReduceSettings(fit="least-squares", controllers=2))
-    api.write_rig(reduction, path)
+    clip = usdhand.read_clip(REPOSITORY / "samples" / "gestures" / "turn_01.usdc")
+    [reduction] = usdhand.reduce_hands([clip], ReduceSettings(fit="least-squares", controllers=2))
+    usdhand.write_rig(reduction, path)
     return path
 
 

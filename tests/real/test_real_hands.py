@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from conftest import shared_data
 
+from usdhand import find_hands, read_clip
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.anatomy.hand import FINGERS, SIDE_PREFIX
 from usdhand.evaluate.compare import find_lag
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
-from usdhand.verbs import find_hands, read_clip
 
 pytestmark = pytest.mark.real_data
 

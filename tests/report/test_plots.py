@@ -12,7 +12,7 @@ import pytest
 from builders.cli_runner import run
 from conftest import REPOSITORY
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.evaluate.agreement import Agreement
 from usdhand.evaluate.reconstruction import METHODS, HandError
 from usdhand.fill.library import ARM_FPS, MotionLibrary
@@ -59,12 +59,12 @@ def lines(panel: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def talk() -> Clip:
-    return api.read_clip(FULL)
+    return usdhand.read_clip(FULL)
 
 
 @pytest.fixture(scope="module")
 def reduction(talk: Clip) -> Reduction:
-    return api.reduce_hands([talk])[0]
+    return usdhand.reduce_hands([talk])[0]
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,7 @@ def library(library_file: Path) -> MotionLibrary:
 
 @pytest.fixture(scope="module")
 def body() -> Clip:
-    return part_of(api.read_clip(BODY), slice(0, 240))
+    return part_of(usdhand.read_clip(BODY), slice(0, 240))
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def filled(body: Clip, library: MotionLibrary) -> Filled:
 
 @pytest.fixture(scope="module")
 def clips() -> tuple[Clip, Clip]:
-    return api.read_clip(BODY), api.read_clip(HANDS)
+    return usdhand.read_clip(BODY), usdhand.read_clip(HANDS)
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +127,7 @@ def test_followers_lie_where_their_channels_are(reduction: Reduction) -> None:
 
 
 def test_several_controllers_are_drawn_against_the_first(talk: Clip) -> None:
-    [found] = api.reduce_hands(
+    [found] = usdhand.reduce_hands(
         [talk], ReduceSettings(free_channels=12, fit="least-squares", controllers=3)
     )
     relation = next(r for r in found.rig.relations if len(r.controllers) == 3)
@@ -168,7 +168,7 @@ def test_histograms_count_channels_and_pairs(reduction: Reduction) -> None:
 
 def test_a_rig_of_other_clips_says_what_it_does(reduction: Reduction) -> None:
     """Channels that do not move here, and those that the rig holds since they did not there."""
-    [found] = api.reduce_hands([api.read_clip(OK)], rig=reduction.rig)
+    [found] = usdhand.reduce_hands([usdhand.read_clip(OK)], rig=reduction.rig)
     constant = sum(r.kind == "constant" for r in found.rig.relations)
     ranges = np.ptp(found.source.select(found.rig.names).values, axis=0)
     still = int((ranges < found.rig.range_threshold).sum())
@@ -216,7 +216,7 @@ def test_counts_that_no_thresholds_leave_have_no_error() -> None:
 
 
 def test_several_clips_are_one_motion() -> None:
-    found = api.reduce_hands([api.read_clip(path) for path in GESTURES[:2]])
+    found = usdhand.reduce_hands([usdhand.read_clip(path) for path in GESTURES[:2]])
     figure = reducing.errors(found)
     [point] = next(xy for label, xy in lines(figure.axes[0]).items() if "this rig" in label)
     together = np.concatenate(
@@ -230,9 +230,9 @@ def test_several_clips_are_one_motion() -> None:
 
 
 def test_nothing_to_show_is_no_plot(talk: Clip) -> None:
-    [free] = api.reduce_hands([talk], ReduceSettings(range_deg=0.0))
+    [free] = usdhand.reduce_hands([talk], ReduceSettings(range_deg=0.0))
     assert set(reducing.figures([free])) == {"reduce_histograms", "reduce_errors"}
-    [still] = api.reduce_hands([api.read_clip(BODY)], ReduceSettings(preset=1))
+    [still] = usdhand.reduce_hands([usdhand.read_clip(BODY)], ReduceSettings(preset=1))
     assert set(reducing.figures([still])) == {"reduce_histograms", "reduce_errors"}
 
 
@@ -241,7 +241,7 @@ def test_nothing_to_show_is_no_plot(talk: Clip) -> None:
 
 def test_speed_and_borders(filled: Filled, body: Clip) -> None:
     part = filled.parts[0]
-    figure = filling.speed(part, body, api.find_hands(body))
+    figure = filling.speed(part, body, usdhand.find_hands(body))
     [panel] = figure.axes
     choices = part.alternatives[0].choices
     borders = sorted({segment[0][0] for segment in panel.collections[0].get_segments()})
@@ -260,10 +260,10 @@ def test_speed_and_borders(filled: Filled, body: Clip) -> None:
 
 
 def test_a_long_clip_is_shown_in_rows_of_its_first_minute(library: MotionLibrary) -> None:
-    clip = api.read_clip(BODY)
+    clip = usdhand.read_clip(BODY)
     long = part_of(clip, np.tile(np.arange(len(clip)), 4))  # type: ignore[arg-type]
     part = fill_api.fill_fingers(long, library, sides=("left",)).parts[0]
-    figure = filling.speed(part, long, api.find_hands(long))
+    figure = filling.speed(part, long, usdhand.find_hands(long))
     assert len(figure.axes) == filling.MOST_ROWS
     assert figure.axes[-1].get_xlim()[1] == pytest.approx(60.0)
     assert "first 60 of 91 s" in figure.get_suptitle()
@@ -364,7 +364,7 @@ def test_evaluation() -> None:
 def test_path_band_and_pins(spliced: Spliced, clips: tuple[Clip, Clip]) -> None:
     body, hands = clips
     settings = SpliceSettings()
-    found = [api.find_hands(clip) for clip in clips]
+    found = [usdhand.find_hands(clip) for clip in clips]
     markers = [
         hand_markers(clip, h, "left", settings.fps) for clip, h in zip(clips, found, strict=True)
     ]
@@ -390,7 +390,7 @@ def test_cost_grid_is_the_mean_of_the_methods_own_costs(
 
     settings, alignment = SpliceSettings(), spliced.hands["left"]
     ours, theirs = (
-        hand_markers(clip, api.find_hands(clip), "left", settings.fps) for clip in clips
+        hand_markers(clip, usdhand.find_hands(clip), "left", settings.fps) for clip in clips
     )
     shown = splicing.common_part(alignment)
     rows, columns, costs = splicing.cost_grid(ours, theirs, alignment, settings, shown)
@@ -415,7 +415,7 @@ def test_cost_grid_is_the_mean_of_the_methods_own_costs(
 
 
 def test_hand_curves_meet_after_alignment(spliced: Spliced, clips: tuple[Clip, Clip]) -> None:
-    found = [api.find_hands(clip) for clip in clips]
+    found = [usdhand.find_hands(clip) for clip in clips]
     figures = splicing.figures(spliced, *clips, *found, SpliceSettings())
     assert set(figures) == set(splicing.NAMES)
     axes = figures["splice_curves_left"].axes

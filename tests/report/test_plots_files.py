@@ -14,7 +14,7 @@ from builders.cli_runner import run
 from builders.preview_pages import page_data
 from conftest import REPOSITORY, shared_data
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.errors import OutputError, UsageError
 from usdhand.evaluate.agreement import Agreement
 from usdhand.report.plots import evaluating, reducing, splicing, style
@@ -38,10 +38,10 @@ def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_files_are_the_same_every_time_and_ask_for_nothing(tmp_path: Path) -> None:
-    clips = api.read_clip(BODY), api.read_clip(HANDS)
+    clips = usdhand.read_clip(BODY), usdhand.read_clip(HANDS)
     alignment = splice_api.splice_hands(*clips, pins=PINS).hands["left"]
-    markers = [hand_markers(c, api.find_hands(c), "left", 60.0) for c in clips]
-    [reduction] = api.reduce_hands([api.read_clip(OK)])
+    markers = [hand_markers(c, usdhand.find_hands(c), "left", 60.0) for c in clips]
+    [reduction] = usdhand.reduce_hands([usdhand.read_clip(OK)])
     names = ("reduce_errors", "splice_path_left")
     for folder in ("a", "b"):
         path = splicing.path("left", alignment, *markers, SpliceSettings())

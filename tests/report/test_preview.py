@@ -24,7 +24,7 @@ from builders.preview_pages import (
 from conftest import shared_data
 from pxr import Usd, UsdGeom, UsdSkel
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.errors import InputError
 from usdhand.formats.usd.shown import read_shown
 from usdhand.formats.usd.skins import read_skins
@@ -47,7 +47,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 
 def test_rotations_are_as_exact_as_stated() -> None:
-    clip = api.read_clip(OK)
+    clip = usdhand.read_clip(OK)
     pack = Pack()
     kept = [pack.rotations(clip.rotations[:, j]) for j in range(len(clip.skeleton))]
     tables = unpacked(pack.document())
@@ -120,7 +120,7 @@ def test_a_mesh_from_maya_moves_as_usd_moves_it() -> None:
 
 def assert_same_points(path: Path, frame: int) -> None:
     character = find_character(path)
-    clip = api.read_clip(path)
+    clip = usdhand.read_clip(path)
     skins, notes = read_skins(character)
     assert skins
     assert not notes
@@ -182,12 +182,12 @@ def test_a_lane_says_what_the_clip_says(tmp_path: Path) -> None:
     run("preview", OK, "-o", tmp_path / "ok.html")
     data = page_data(tmp_path / "ok.html")
     [lane] = data["lanes"]
-    clip = api.read_clip(OK)
+    clip = usdhand.read_clip(OK)
     assert lane["frames"] == len(clip)
     assert lane["duration"] == pytest.approx(clip.duration)
     assert lane["name"] == "ok_01"
     tables = unpacked(data)
-    hands = api.find_hands(clip)
+    hands = usdhand.find_hands(clip)
     channels = hands.encode(clip)
     for side in ("left", "right"):
         curves = lane["hands"][side]["channels"]
@@ -224,8 +224,8 @@ def test_digits_that_hang_off_nothing_have_curves(tmp_path: Path) -> None:
     run("preview", file, "-o", tmp_path / "hand.html")
     [lane] = page_data(tmp_path / "hand.html")["lanes"]
     assert len(lane["hands"]["left"]["channels"]) == 25
-    clip = api.read_character(file)
-    hands = api.find_hands(clip)
+    clip = usdhand.read_character(file)
+    hands = usdhand.find_hands(clip)
     again = hands.decode(hands.encode(clip), clip)
     assert rot.angle_between(again.rotations, clip.rotations).max() < 1e-6
 
@@ -243,7 +243,7 @@ def test_digits_of_flat_rigs_have_bones(tmp_path: Path, side: str) -> None:
              "phalanx_intermediate", "phalanx_distal", "tip")]  # fmt: skip
     assert set(zip(["wrist", *index], index, strict=False)) <= bones
     assert ("wrist", "thumb_metacarpal") in bones
-    clip = api.read_character(file)
+    clip = usdhand.read_character(file)
     at = forward_kinematics(clip).positions[0]
     for bone in lane["bones"]:
         assert bone["part"] == side
@@ -282,7 +282,7 @@ def test_long_clips_are_decimated_with_a_word(tmp_path: Path) -> None:
     page = tmp_path / "long.html"
     done = run("preview", OK, "-o", page, "--max-frames", "10")
     [lane] = page_data(page)["lanes"]
-    clip = api.read_clip(OK)
+    clip = usdhand.read_clip(OK)
     every = -(-len(clip) // 10)
     assert every > 3
     words = f"the page has every {every}th of {len(clip)} frames"
@@ -297,7 +297,7 @@ def test_long_clips_are_decimated_with_a_word(tmp_path: Path) -> None:
 
 def test_joined_clips_of_the_measured_page_are_one_motion(tmp_path: Path) -> None:
     clip = joined([OK, GESTURES / "ok_02.usdc"], tmp_path / "two.usdc", 3.0)
-    assert len(api.read_clip(tmp_path / "two.usdc")) == len(clip) == 181
+    assert len(usdhand.read_clip(tmp_path / "two.usdc")) == len(clip) == 181
 
 
 # Reports

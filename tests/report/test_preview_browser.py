@@ -17,7 +17,7 @@ from builders.cli_runner import run
 from builders.preview_pages import FLAGS, GESTURES, chromium, make_results, one_minute, page_data
 from conftest import shared_data
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.motion import forward_kinematics
 from usdhand.motion import rotations as rot
 
@@ -177,7 +177,7 @@ def test_it_opens_and_shows_a_character_on_each_lane(pages: Pages, folder: Path)
 def test_motion_on_the_page_is_that_of_the_clip(pages: Pages, folder: Path, name: str) -> None:
     """The page's own modules, posed at whole and half frames, against our kinematics."""
     page = pages.open(folder / f"{name}.html")
-    clip = api.read_clip(folder / {"fill": "filled.usda", "splice": "spliced.usda"}[name])
+    clip = usdhand.read_clip(folder / {"fill": "filled.usda", "splice": "spliced.usda"}[name])
     frames = [0, 7, len(clip) - 1]
     found = page.page.evaluate(
         """async (frames) => {
@@ -241,7 +241,7 @@ def test_playing_keeps_the_time_of_the_clock(pages: Pages, folder: Path) -> None
 
 def test_scrubbing_by_slider_and_on_the_rows(pages: Pages, folder: Path) -> None:
     page = pages.open(folder / "fill.html")
-    clip = api.read_clip(folder / "filled.usda")
+    clip = usdhand.read_clip(folder / "filled.usda")
     first = page.picture
     page.page.fill("#scrub", str(clip.duration / 2))
     page.settle()
@@ -271,7 +271,7 @@ def test_scrubbing_by_slider_and_on_the_rows(pages: Pages, folder: Path) -> None
 
 def test_keys_step_and_jump(pages: Pages, folder: Path) -> None:
     page = pages.open(folder / "fill.html")
-    clip = api.read_clip(folder / "filled.usda")
+    clip = usdhand.read_clip(folder / "filled.usda")
     report = json.loads((folder / "fill.json").read_text())
     page.press("ArrowRight", "ArrowRight")
     assert page.time == pytest.approx(2 / clip.fps)
@@ -297,7 +297,7 @@ def test_keys_step_and_jump(pages: Pages, folder: Path) -> None:
 
 def test_first_and_last_frame_stop_the_playback(pages: Pages, folder: Path) -> None:
     page = pages.open(folder / "fill.html")
-    end = api.read_clip(folder / "filled.usda").duration
+    end = usdhand.read_clip(folder / "filled.usda").duration
     assert page.page.get_attribute("#loop", "aria-pressed") == "true"
     for key, time in (("End", end), ("Home", 0.0)):
         page.press("Space")
@@ -309,7 +309,7 @@ def test_first_and_last_frame_stop_the_playback(pages: Pages, folder: Path) -> N
 
 def test_a_lane_that_is_over_says_so(pages: Pages, tmp_path: Path) -> None:
     files = [GESTURES / "ok_03.usdc", GESTURES / "ok_04.usdc"]
-    clips = [api.read_clip(f) for f in files]
+    clips = [usdhand.read_clip(f) for f in files]
     run("preview", *files, "--max-points", "0", "-o", tmp_path / "two.html")
     page = pages.open(tmp_path / "two.html")
     short = int(clips[0].duration > clips[1].duration)
@@ -349,7 +349,7 @@ def test_a_flat_hand_is_seen(pages: Pages, tmp_path: Path) -> None:
     run("preview", file, "-o", tmp_path / "hand.html")
     page = pages.open(tmp_path / "hand.html")
     assert near(page.picture, BLUE) > 3000
-    clip = api.read_character(file)
+    clip = usdhand.read_character(file)
     at = forward_kinematics(clip).positions[0]
     bones = page_data(tmp_path / "hand.html")["lanes"][0]["bones"]
     found = page.page.evaluate("""async () => {
@@ -475,8 +475,8 @@ def test_a_hand_clip_plays_in_the_time_of_the_body(pages: Pages, folder: Path) -
     page = pages.open(folder / "splice.html")
     assert "in the body’s time" in page.page.locator(".lane-label small").nth(1).text_content()
     report = json.loads((folder / "splice.json").read_text())["hands"]["right"]
-    hands = api.read_clip(GESTURES / "ok_04.usdc")
-    channels = api.find_hands(hands).encode(hands)
+    hands = usdhand.read_clip(GESTURES / "ok_04.usdc")
+    channels = usdhand.find_hands(hands).encode(hands)
     body, hand = report["warp"][len(report["warp"]) // 2]
     page.page.fill("#scrub", str(body))
     page.settle()

@@ -14,7 +14,7 @@ from conftest import REPOSITORY, shared_data
 from numpy.testing import assert_allclose
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.anatomy import SIDES, Hands, Side
 from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Skeleton, forward_kinematics, parents_from_paths
@@ -30,16 +30,16 @@ BODY = SAMPLES / "conversations" / "talk_03_body.usdc"
 
 @pytest.fixture(scope="module")
 def ada() -> Clip:
-    return api.read_clip(ADA)
+    return usdhand.read_clip(ADA)
 
 
 @pytest.fixture(scope="module")
 def ben() -> Clip:
-    return api.read_clip(BEN)
+    return usdhand.read_clip(BEN)
 
 
 def below_wrists(clip: Clip) -> set[int]:
-    wrists = {h.wrist for h in api.find_hands(clip).character.hands.values()}
+    wrists = {h.wrist for h in usdhand.find_hands(clip).character.hands.values()}
     return {j for j in range(len(clip.skeleton)) if wrists & set(clip.skeleton.ancestors(j))}
 
 
@@ -69,7 +69,7 @@ def still(skeleton: Skeleton) -> Clip:
 
 
 def grafted(body: Clip, donor: Clip) -> Grafted:
-    return add_finger_joints(body, donor.skeleton, api.find_hands(donor))
+    return add_finger_joints(body, donor.skeleton, usdhand.find_hands(donor))
 
 
 def palm(skeleton: Skeleton, hands: Hands, side: Side) -> np.ndarray:
@@ -87,7 +87,7 @@ def test_a_hand_comes_back_where_it_was(of: str, onto: str, request: pytest.Fixt
     donor, whole = request.getfixturevalue(of), request.getfixturevalue(onto)
     body = bare(whole)
     made = grafted(body, donor).clip
-    true, found = api.find_hands(whole), api.find_hands(made)
+    true, found = usdhand.find_hands(whole), usdhand.find_hands(made)
     count = len(body.skeleton)
     assert made.skeleton.joints[:count] == body.skeleton.joints
     assert np.array_equal(made.rotations[:, :count], body.rotations)
@@ -100,7 +100,7 @@ def test_a_hand_comes_back_where_it_was(of: str, onto: str, request: pytest.Fixt
             c.skeleton.bind_positions[[h.character.hands[side].wrist for h in [hands]]
                                       + [hands.character.hands[side].joints["MiddleMCP"]]
                                       + [hands.character.hands[side].elbow]]
-            for c, hands in ((made, found), (donor, api.find_hands(donor)))
+            for c, hands in ((made, found), (donor, usdhand.find_hands(donor)))
         )  # fmt: skip
         ratios = [np.linalg.norm(p[1] - p[0]) / np.linalg.norm(p[2] - p[0]) for p in (own, theirs)]
         assert ratios[0] == pytest.approx(ratios[1])
@@ -119,7 +119,7 @@ def test_every_naming(name: str, pose: str, ada: Clip) -> None:
     body = without(still(whole), fingers)
     assert bare_arms(body.skeleton) is not None
     made = grafted(body, ada)
-    found = api.find_hands(made.clip)
+    found = usdhand.find_hands(made.clip)
     for side in SIDES:
         frames, hand = found.frames[side], found.character.hands[side]
         assert len(frames.names) == 15
@@ -135,18 +135,18 @@ _DIGITS = {"Thumb", "Index", "Middl", "Ring", "RingM", "RingP", "RingD", "RingT"
 
 def test_hands_are_mirror_images(ada: Clip) -> None:
     """A donor's one hand serves both sides, and both come out mirrored at the bind pose."""
-    hands = api.find_hands(ada)
+    hands = usdhand.find_hands(ada)
     one = replace(hands, frames={"right": hands.frames["right"]})
     made = add_finger_joints(bare(ada), ada.skeleton, one)
     assert {side: len(paths) for side, paths in made.added.items()} == {"left": 20, "right": 20}
     points = made.clip.skeleton.bind_positions
-    found = api.find_hands(made.clip).character.hands
+    found = usdhand.find_hands(made.clip).character.hands
     for role in found["left"].joints:
         left, right = (points[found[side].joints[role]] for side in SIDES)
         assert_allclose(left, right * [-1, 1, 1], atol=0.3)
     shapes = [hand_shape(ada.skeleton, one, side) for side in SIDES]
     assert_allclose(np.linalg.det(shapes[0].rotations), 1.0)
-    channels = api.find_hands(made.clip).encode(made.clip)
+    channels = usdhand.find_hands(made.clip).encode(made.clip)
     left, right = (
         channels.values[0, [n.startswith(p) for n in channels.names]] for p in ("le", "ri")
     )
@@ -158,9 +158,9 @@ def test_names_that_are_taken_are_not_used_again(ada: Clip) -> None:
     joints = below_wrists(ada)
     thumbs = {j for j in joints if ada.skeleton.names[j].endswith("HandThumb1")}
     body = without(ada, joints - thumbs)
-    made = grafted(body, api.read_clip(BEN))
+    made = grafted(body, usdhand.read_clip(BEN))
     assert len(set(made.clip.skeleton.joints)) == len(made.clip.skeleton)
-    found = api.find_hands(made.clip)
+    found = usdhand.find_hands(made.clip)
     assert [len(f.names) for f in found.frames.values()] == [15, 15]
     added = {path for paths in made.added.values() for path in paths}
     for hand in found.character.hands.values():
@@ -174,8 +174,8 @@ def test_a_hand_joint_gives_the_direction(ada: Clip) -> None:
     names = [j.replace("HandMiddle1", "HandEnd") for j in body.skeleton.joints]
     body = replace(body, skeleton=replace(body.skeleton, joints=tuple(names)))
     made = grafted(body, ada)
-    true = api.find_hands(ada)
-    found = api.find_hands(made.clip)
+    true = usdhand.find_hands(ada)
+    found = usdhand.find_hands(made.clip)
     for side in SIDES:
         ours, theirs = palm(made.clip.skeleton, found, side), palm(ada.skeleton, true, side)
         assert ours[:, 2] @ theirs[:, 2] == pytest.approx(1.0, abs=1e-6)
@@ -198,7 +198,7 @@ def test_arms_that_hang_have_their_thumbs_in_front(ada: Clip) -> None:
             if j == hand.shoulder or hand.shoulder in s.ancestors(j):
                 bind[j] = turn @ bind[j]
     made = grafted(still(replace(s, bind=bind)), ada)
-    found = api.find_hands(made.clip)
+    found = usdhand.find_hands(made.clip)
     for side, inward in (("left", -1.0), ("right", 1.0)):
         normal, flexion, forward = palm(made.clip.skeleton, found, side).T
         assert forward[1] < -0.95
@@ -240,15 +240,15 @@ def test_wrists_named_in_a_map_file(tmp_path: Path, ada: Clip) -> None:
     paths = {p: f"b{i}" for i, p in enumerate(body.skeleton.joints)}
     joints = tuple("/".join(_numbered(paths, p)) for p in body.skeleton.joints)
     nameless = replace(body, skeleton=replace(body.skeleton, joints=joints))
-    wrists = {s: h.wrist for s, h in api.find_hands(ada).character.hands.items()}
+    wrists = {s: h.wrist for s, h in usdhand.find_hands(ada).character.hands.items()}
     table = tmp_path / "map.toml"
     kept = [j for j in range(len(ada.skeleton)) if j not in below_wrists(ada)]
     table.write_text(
         "".join(f'[{s}]\nwrist = "{joints[kept.index(w)]}"\n' for s, w in wrists.items())
     )
-    conventions = api.conventions_from([table])
-    made = add_finger_joints(nameless, ada.skeleton, api.find_hands(ada), conventions)
-    assert [len(f.names) for f in api.find_hands(made.clip, conventions).frames.values()] == [
+    conventions = usdhand.conventions_from([table])
+    made = add_finger_joints(nameless, ada.skeleton, usdhand.find_hands(ada), conventions)
+    assert [len(f.names) for f in usdhand.find_hands(made.clip, conventions).frames.values()] == [
         15,
         15,
     ]
@@ -264,7 +264,7 @@ def _numbered(names: dict[str, str], path: str) -> list[str]:
 
 def bare_file(source: Path, target: Path) -> Path:
     """A file without finger joints in skeleton and animation, with a mesh bound to its arms."""
-    clip = api.read_clip(source)
+    clip = usdhand.read_clip(source)
     layer = Usd.Stage.Open(str(source)).Flatten()
     stage = Usd.Stage.Open(layer)
     OPEN.append(stage)
@@ -351,8 +351,8 @@ def test_a_body_file_gains_fingers(library: Path, tmp_path: Path, flatten: bool)
                     assert np.array_equal(np.array(one.Get(time))[i], values[theirs.index(joint)])
     assert_allclose(skinned(body), skinned(out), atol=1e-6)
     assert np.ptp(skinned(out), axis=0).max() > 0.01
-    filled = api.read_clip(out)
-    for side, frames in api.find_hands(filled).frames.items():
+    filled = usdhand.read_clip(out)
+    for side, frames in usdhand.find_hands(filled).frames.items():
         assert len(frames.names) == 15
         assert np.ptp(filled.rotations[:, frames.joints], axis=0).max() > 0.04, side
     run("check", out)
@@ -396,11 +396,13 @@ def test_a_skeleton_without_poses(library: Path, tmp_path: Path) -> None:
         del layer.GetPrimAtPath("/Ben/Skeleton").properties[name]
     layer.Save()
     run("fill", body, "--library", library, "-o", out, "--add-fingers")
-    clip = api.read_clip(out)
+    clip = usdhand.read_clip(out)
     assert not {p.code for p in clip.problems} & {"missing-bind", "missing-rest"}
-    assert len(api.find_hands(clip).frames) == 2
-    joints = list(api.find_hands(clip).frames["left"].joints)
-    pose = forward_kinematics(clip, [api.find_hands(clip).character.hands["left"].wrist, *joints])
+    assert len(usdhand.find_hands(clip).frames) == 2
+    joints = list(usdhand.find_hands(clip).frames["left"].joints)
+    pose = forward_kinematics(
+        clip, [usdhand.find_hands(clip).character.hands["left"].wrist, *joints]
+    )
     reach = np.linalg.norm(pose.positions[:, 1:] - pose.positions[:, :1], axis=-1)
     assert 1.0 < reach.min() < reach.max() < 25.0
 
@@ -409,9 +411,9 @@ def test_a_skeleton_without_poses(library: Path, tmp_path: Path) -> None:
 def test_real_body_motion(library: Path, tmp_path: Path) -> None:
     """Hands on a character from Maya, without its own, come where its own are."""
     source = shared_data("maya", "HIK_Export.usda")
-    whole = api.read_clip(source)
-    made = grafted(bare(whole), api.read_clip(BEN))
-    true, found = api.find_hands(whole), api.find_hands(made.clip)
+    whole = usdhand.read_clip(source)
+    made = grafted(bare(whole), usdhand.read_clip(BEN))
+    true, found = usdhand.find_hands(whole), usdhand.find_hands(made.clip)
     for side in SIDES:
         away = degrees_apart(
             palm(whole.skeleton, true, side), palm(made.clip.skeleton, found, side)
@@ -429,8 +431,8 @@ def test_body_only_bvh(library: Path, tmp_path: Path, name: str) -> None:
     body = shared_data("bvh", "animated-drawings", f"{name}.bvh")
     out = tmp_path / "out.usda"
     text = run("fill", body, "--library", library, "-o", out, "--add-fingers").output
-    clip = api.read_clip(out)
-    hands = api.find_hands(clip)
+    clip = usdhand.read_clip(out)
+    hands = usdhand.find_hands(clip)
     for side in SIDES:
         assert f"{side} hand: {'L' if side == 'left' else 'R'}" in text
         assert "stays as it is beside the added thumb" in text

@@ -18,6 +18,7 @@ from builders.known_pairs import (
 )
 from conftest import REPOSITORY, shared_data
 
+from usdhand import find_hands, read_clip
 from usdhand.anatomy import Side
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
@@ -26,7 +27,6 @@ from usdhand.splice.markers import Markers
 from usdhand.splice.merge import with_fingers
 from usdhand.splice.method import Spliced, align, splice
 from usdhand.splice.settings import Align, Pin, SpliceSettings
-from usdhand.verbs import find_hands, read_clip
 from usdhand.verbs.splice import splice_hands
 
 SAMPLES = REPOSITORY / "samples"

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from usdhand.cli.console import Bar, say, show
-from usdhand.cli.parameters import parameters, request_of
+from usdhand.cli.parameters import name_of, parameters
+from usdhand.options import declared
 from usdhand.problems import Problem
 from usdhand.requests.base import Request
+from usdhand.requests.codec import base_of
 from usdhand.requests.verbs import request_class
 
 
@@ -34,25 +38,46 @@ def command_of(verb: str) -> click.Command:
 
 def _call(owner: type[Request]) -> None:
     context = click.get_current_context()
-    shown: dict[str, Any] = {k: context.params.get(k, False) for k in ("as_json", "quiet")}
+    quiet, as_json = context.params["quiet"], context.params["as_json"]
     request = request_of(owner, context)
+    bar = Bar()
 
     def listen(problem: Problem) -> None:
         bar.close()
-        if problem.severity == "error" or not (
-            shown["quiet"] or (shown["as_json"] and problem.severity == "note")
-        ):
+        if problem.severity == "error" or not (quiet or (as_json and problem.severity == "note")):
             show(problem)
 
     from usdhand.verbs.run import run
 
-    bar = Bar()
     try:
         outcome = run(request, listener=listen, watch=bar)
     finally:
         bar.close()
-    if shown["as_json"]:
+    if as_json:
         click.echo(outcome.to_json())
-    elif not shown["quiet"] and (text := outcome.to_text(context.params.get("verbose", False))):
-        say(text)
+    elif not quiet:
+        say(outcome.to_text(context.params.get("verbose", False)))
+        if outcome.drawn is not None:
+            say(f"plots written to {outcome.drawn}")
     context.exit(outcome.exit_code)
+
+
+def request_of(owner: type[Request], context: click.Context) -> Request:
+    """Make the request of what was given on the command line.
+
+    Of settings, what was not given is as the option that chooses between them says.
+    """
+    values = context.params
+    made: dict[str, Any] = {}
+    for own in declared(owner):
+        if own.option.role != "settings":
+            made[own.name] = values[own.name]
+            continue
+        inner = {d.name: name_of(d, own) for d in declared(own.type)}
+        given = {n: values[p] for n, p in inner.items() if _given(context, p)}
+        made[own.name] = replace(base_of(own, values.get(own.option.chosen_by)), **given)
+    return owner(**made)
+
+
+def _given(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is not ParameterSource.DEFAULT

@@ -47,6 +47,9 @@ class VerbGroup(click.Group):
         except UsdHandError as error:
             click.echo(f"Error: {error}", err=True)
             ctx.exit(error.exit_code)
+        except KeyboardInterrupt:
+            click.echo("Interrupted.", err=True)
+            ctx.exit(130)
 
 
 @click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -55,5 +58,5 @@ def main() -> None:
     """Hands for digital characters, over OpenUSD.
 
     Exit codes: 0 ok, 1 failed or a check failed, 2 usage, 3 unreadable or unsupported input,
-    4 no hand or an ambiguous one, 5 a quality limit was not met.
+    4 no hand or an ambiguous one, 5 a quality limit was not met, 130 interrupted.
     """

@@ -1,51 +1,29 @@
-"""Options of requests as parameters of click, and the request of what was given."""
+"""Options of requests as parameters of click, each also an environment variable."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, replace
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 import click
-from click.core import ParameterSource
 
-from usdhand.options import Declared, alternatives, declared, flat
+from usdhand.options import Declared, alternatives, flat
 from usdhand.requests.base import Request
-from usdhand.requests.codec import base_of
 
 
 def parameters(owner: type[Request]) -> list[click.Parameter]:
     """All options and arguments of a request, in the order of its fields."""
-    return [_parameter(own, inside) for own, inside in flat(owner)]
+    return [_parameter(own, inside, owner.verb) for own, inside in flat(owner)]
 
 
-def request_of(owner: type[Request], context: click.Context) -> Request:
-    """Make the request of what was given on the command line.
-
-    Of settings, what was not given is as the option that chooses between them says.
-    """
-    values = context.params
-    made: dict[str, Any] = {}
-    for own in declared(owner):
-        if own.option.role != "settings":
-            made[own.name] = values[own.name]
-            continue
-        inner = {d.name: _name(d, own) for d in declared(own.type)}
-        given = {n: values[p] for n, p in inner.items() if _given(context, p)}
-        made[own.name] = replace(base_of(own, values.get(own.option.chosen_by)), **given)
-    return owner(**made)
-
-
-def _given(context: click.Context, name: str) -> bool:
-    return context.get_parameter_source(name) is not ParameterSource.DEFAULT
-
-
-def _name(own: Declared, inside: Declared | None) -> str:
+def name_of(own: Declared, inside: Declared | None) -> str:
+    """Name of the parameter of an option, which may be one of settings."""
     return own.name if inside is None else f"{inside.name}_{own.name}"
 
 
-def _parameter(own: Declared, inside: Declared | None) -> click.Parameter:
+def _parameter(own: Declared, inside: Declared | None, verb: str) -> click.Parameter:
     kind = alternatives(own.type)[0]
     many = get_origin(kind) is tuple and get_args(kind)[1:] == (...,)
     details: dict[str, Any] = {"type": _type(own, get_args(kind)[0] if many else kind)}
@@ -63,8 +41,11 @@ def _parameter(own: Declared, inside: Declared | None) -> click.Parameter:
         details |= {"default": own.option.shown or None, "show_default": bool(own.option.shown)}
     elif own.default is not MISSING:
         details |= {"default": own.default, "show_default": own.default is not None}
-    name = _name(own, inside)
-    return click.Option([name, *own.flags], required=own.required, help=own.option.help, **details)
+    if own.option.reported:
+        words = [*verb.split(), own.flags[-1].removeprefix("--").replace("-", "_")]
+        details["envvar"] = "_".join(["usdhand", *words]).upper()
+    names = [name_of(own, inside), *own.flags]
+    return click.Option(names, required=own.required, help=own.option.help, **details)
 
 
 def _type(own: Declared, kind: Any) -> click.ParamType[Any]:

@@ -43,9 +43,9 @@ def _request(owner: type[R], data: Mapping[str, Any]) -> R:
     for name, own in known.items():
         if own.option.role == "settings":
             base = base_of(own, data.get(own.option.chosen_by))
-            values[name] = _changed(base, data.get(name) or {}, name)
+            values[name] = _changed(base, data.get(name, {}), name)
         elif name in data:
-            values[name] = _value(own.type, data[name], name)
+            values[name] = _bounded(own, _value(own.type, data[name], name), name)
         elif own.default is MISSING:
             raise UsageError(f"A request '{owner.verb}' needs '{name}': {own.option.help}")
     return owner(**values)
@@ -63,7 +63,22 @@ def _changed(base: Any, data: Any, where: str) -> Any:
         raise UsageError(f"'{where}' is no object of settings.")
     hints = get_type_hints(type(base))
     _check_names(data, hints, f"'{where}'")
-    return replace(base, **{k: _value(hints[k], v, f"{where}.{k}") for k, v in data.items()})
+    given = {k: _value(hints[k], v, f"{where}.{k}") for k, v in data.items()}
+    for own in declared(type(base)):
+        if own.name in given:
+            _bounded(own, given[own.name], f"{where}.{own.name}")
+    return replace(base, **given)
+
+
+def _bounded(own: Declared, value: Any, where: str) -> Any:
+    """The value, if it is within the option's bounds."""
+    least, most = own.option.at_least, own.option.at_most
+    if isinstance(value, int):
+        if least is not None and value < least:
+            raise UsageError(f"'{where}' cannot be {value}: {least} is the least.")
+        if most is not None and value > most:
+            raise UsageError(f"'{where}' cannot be {value}: {most} is the most.")
+    return value
 
 
 def _check_names(data: Mapping[str, Any], known: Mapping[str, Any], who: str) -> None:

@@ -138,7 +138,9 @@ def _what_is_kept(output: Path) -> str:
 
 
 class InterruptedBuildError(UsdHandError):
-    """A build was interrupted (exit 1)."""
+    """A build was interrupted (exit 130)."""
+
+    exit_code = 130
 
 
 class TerminatedBuildError(UsdHandError):

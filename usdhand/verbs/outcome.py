@@ -86,6 +86,7 @@ class Outcome:
     settings : more of the report's settings than the request says itself
     figures : draws the plots that the request asked for
     written : outputs, reports and plots not among them
+    drawn : folder that plots were written to
     problems : everything odd, in the order in which it came
     exit_code : of the command line
     """
@@ -97,6 +98,7 @@ class Outcome:
     settings: Mapping[str, Any] = field(default_factory=dict)
     figures: Callable[[], Mapping[str, Figure]] | None = None
     written: tuple[Path, ...] = ()
+    drawn: Path | None = None
     problems: tuple[Problem, ...] = ()
     exit_code: int = 0
 

@@ -50,6 +50,7 @@ def run_verb(request: Request, journal: Journal) -> Outcome:
     folder = getattr(request, "plots", None)
     if folder is not None and outcome.figures is not None:
         write_plots(folder, outcome.figures(), force)
+        outcome = replace(outcome, drawn=folder)
     return outcome
 
 
