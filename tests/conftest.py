@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,15 @@ SHARED = Path(os.environ.get("USDHAND_SHARED", REPOSITORY.parent / "shared"))
 # The same examples in every run: a failure can be made again. Machines differ in speed.
 settings.register_profile("usdhand", deadline=None, derandomize=True)
 settings.load_profile("usdhand")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _every_report_fits_its_schema() -> Iterator[None]:
+    """Whatever report a test makes in this process is judged by the schema that users get."""
+    from builders.report_schemas import judged
+
+    with judged():
+        yield
 
 
 def shared_data(*parts: str) -> Path:

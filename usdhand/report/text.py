@@ -10,10 +10,12 @@ from usdhand.problems import Problem
 
 def problems_data(problems: Iterable[Problem]) -> list[dict[str, str]]:
     """Problems as plain data."""
-    return [
-        {"severity": p.severity, "code": p.code, "message": p.message, "where": p.where}
-        for p in problems
-    ]
+    return [problem_data(problem) for problem in problems]
+
+
+def problem_data(p: Problem) -> dict[str, str]:
+    """A problem as plain data, without its file."""
+    return {"severity": p.severity, "code": p.code, "message": p.message, "where": p.where}
 
 
 def table(rows: Sequence[Sequence[str]], right: Iterable[int] = ()) -> str:

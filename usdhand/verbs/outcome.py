@@ -12,6 +12,7 @@ from usdhand.errors import UsdHandError
 from usdhand.problems import Problem, Severity
 from usdhand.progress import each
 from usdhand.report.document import document, dumps
+from usdhand.report.text import problem_data
 from usdhand.requests.base import Request
 
 if TYPE_CHECKING:
@@ -110,12 +111,13 @@ class Outcome:
     @property
     def document(self) -> dict[str, Any]:
         """The whole report: how it was made, its inputs with their hashes, and the result."""
-        return document(
-            self.request,
-            self.inputs,
-            self.request.reported() | dict(self.settings),
-            self.result,
-        )
+        settings = self.request.reported() | dict(self.settings)
+        own = {
+            "exit_code": self.exit_code,
+            "written": list(self.written),
+            "problems": [{"file": p.file, **problem_data(p)} for p in self.problems],
+        }
+        return document(self.request, self.inputs, settings, self.result) | {"outcome": own}
 
     def to_json(self) -> str:
         """Return the report as text."""
