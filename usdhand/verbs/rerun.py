@@ -22,6 +22,8 @@ def run(request: RerunRequest, journal: Journal) -> Outcome:
     """Do what a report says was asked for, once its inputs are what they were."""
     report = _read(request.report_file)
     asked = _changed(from_data(report["request"]), request)
+    if isinstance(asked, RerunRequest):
+        raise UsageError(f"{request.report_file}: a rerun is not run again itself.")
     changed = _changes(report)
     if changed and not request.accept_changes:
         raise InputError(

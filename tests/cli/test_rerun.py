@@ -1,0 +1,99 @@
+"""usdhand rerun: results made again from their reports, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from builders.cli_runner import run
+from conftest import REPOSITORY
+from pxr import Sdf
+
+SAMPLES = REPOSITORY / "samples"
+OK = SAMPLES / "gestures" / "ok_01.usdc"
+BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
+HANDS = SAMPLES / "hands" / "talk_01_hands_a.usdc"
+
+
+def text(path: Path) -> str:
+    found: str = Sdf.Layer.FindOrOpen(str(path)).ExportToString()
+    return found
+
+
+@pytest.fixture
+def report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Of a reduction with settings that are not the default, with paths seen from its folder."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(OK, tmp_path / "ok.usdc")
+    run("reduce", "ok.usdc", "-o", "r.usda", "--target-dofs", 9, "--fit", "least-squares",
+        "--controllers", 2, "--side", "right", "--report", "r.json")  # fmt: skip
+    return tmp_path / "r.json"
+
+
+def test_a_result_is_made_again(report: Path) -> None:
+    first, kept = json.loads(report.read_text()), text(Path("r.usda"))
+    assert "exists; use --force" in run("rerun", report, code=2).output
+    Path("r.usda").unlink()
+    run("rerun", report, "--report", "again.json")
+    assert text(Path("r.usda")) == kept
+    again = json.loads(Path("again.json").read_text())
+    assert again["request"]["report"] == "again.json"
+    for made in (first, again):
+        made["request"].pop("report")
+    assert again == first
+
+
+def test_a_result_goes_elsewhere(report: Path) -> None:
+    before = report.read_bytes()
+    printed = json.loads(run("rerun", report, "-o", "new.usda", "--json").stdout)
+    assert printed["output"] == "new.usda"
+    assert printed["free_channels"] == 9
+    assert Path("new.usda").exists()
+    assert report.read_bytes() == before
+
+
+def test_a_changed_input_is_refused_until_it_is_accepted(report: Path) -> None:
+    shutil.copy(SAMPLES / "gestures" / "ok_02.usdc", "ok.usdc")
+    message = run("rerun", report, "-o", "new.usda", code=3).output
+    assert "ok.usdc changed since" in message
+    assert "--accept-changes" in message
+    assert not Path("new.usda").exists()
+    assert "has changed" in run("rerun", report, "-o", "new.usda", "--accept-changes").output
+    assert Path("new.usda").exists()
+
+
+def test_splice_is_made_again_with_its_pins(tmp_path: Path) -> None:
+    out, report = tmp_path / "s.usda", tmp_path / "s.json"
+    run("splice", BODY, HANDS, "--pin", "1:1", "--pin", "181:403", "--band", "0.25,0.08",
+        "-o", out, "--report", report)  # fmt: skip
+    before = text(out)
+    out.unlink()
+    run("rerun", report)
+    assert text(out) == before
+
+
+@pytest.mark.parametrize(
+    ("content", "code", "words"),
+    [
+        ("", 3, "no JSON report"),
+        ("[" * 100_000, 3, "no JSON report"),
+        ("{}", 3, "holds no request"),
+        ('{"request": {"verb": "reduce"}, "inputs": [1]}', 3, "holds no request"),
+        ('{"request": {"verb": "dance"}, "inputs": []}', 2, "no verb 'dance'"),
+        ('{"request": {"verb": "rerun", "report_file": "r.json"}, "inputs": []}', 2, "itself"),
+    ],
+)
+def test_what_is_no_report_is_refused(tmp_path: Path, content: str, code: int, words: str) -> None:
+    path = tmp_path / "r.json"
+    path.write_text(content)
+    assert words in run("rerun", path, code=code).output
+    assert "no such file" in run("rerun", tmp_path / "none.json", code=3).output.lower()
+
+
+def test_an_option_that_the_verb_has_not_is_refused(tmp_path: Path) -> None:
+    report = tmp_path / "i.json"
+    report.write_text(run("inspect", OK, "--json").stdout)
+    assert "'inspect' has no --output" in run("rerun", report, "-o", "x.usda", code=2).output
+    assert "hands by convention" in run("rerun", report).output
