@@ -47,7 +47,9 @@ def test_quiet_json_and_help_are_there(verb: str) -> None:
 
 def test_an_unknown_verb_or_option_is_a_usage_error() -> None:
     assert "No such command 'reduc'" in run("reduc", code=2).output
-    assert "Did you mean --target-dofs" in run("reduce", OK, "--target-dof", 3, code=2).output
+    text = run("reduce", OK, "--target-dof", 3, code=2).output
+    assert "Did you mean" in text
+    assert "--target-dofs" in text
 
 
 def test_an_interruption_is_no_traceback(monkeypatch: pytest.MonkeyPatch) -> None:

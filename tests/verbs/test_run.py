@@ -81,9 +81,9 @@ def test_requests_say_what_contradicts_itself(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="either -o OUTPUT or --out-dir"):
         run(ConvertRequest(files=(str(OK),)))
     out = tmp_path / "out.usda"
+    library = tmp_path / "l.usdc"
+    run(LibraryBuildRequest(clips=(str(OK),), output=library))
     with pytest.raises(UsageError, match="is a motion library"):
-        library = tmp_path / "l.usdc"
-        run(LibraryBuildRequest(clips=(str(OK),), output=library))
         run(FillRequest(body=library, library=library.with_name("l.usdc"), output=out))
 
 
