@@ -41,6 +41,9 @@ CHARACTERS: dict[str, dict[str, object]] = {
     "non-uniform scales": {
         "scales": np.random.default_rng(5).uniform(0.7, 1.3, (1, COUNT, 3)),
     },
+    "mirroring joints": {
+        "scales": np.random.default_rng(6).choice([-1.0, 1.0], (1, COUNT, 3)),
+    },
     "metres": {"meters": 1.0, "translations": HUNDREDS},
     "inches": {"meters": 0.0254},
     "Z up": {"up": "Z"},

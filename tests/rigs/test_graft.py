@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.cli_runner import run
+from builders.mirroring import mirror_below
 from builders.rigs import build, known_rigs
 from conftest import REPOSITORY, shared_data
 from numpy.testing import assert_allclose
+from oracles.usdskel import joint_worlds
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 import usdhand
@@ -405,6 +407,41 @@ def test_a_skeleton_without_poses(library: Path, tmp_path: Path) -> None:
     )
     reach = np.linalg.norm(pose.positions[:, 1:] - pose.positions[:, :1], axis=-1)
     assert 1.0 < reach.min() < reach.max() < 25.0
+
+
+@pytest.fixture(scope="module")
+def filled(library: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A body without finger joints, and the same with filled fingers."""
+    folder = tmp_path_factory.mktemp("filled")
+    body, out = bare_file(BODY, folder / "body.usdc"), folder / "out.usdc"
+    run("fill", body, "--library", library, "-o", out, "--add-fingers")
+    return body, out
+
+
+@pytest.mark.parametrize("top", ["clavicle_r", "hand_l"])
+@pytest.mark.parametrize("signs", [(-1, 1, 1), (1, -1, 1), (-1, -1, -1), (1, 1, -1), (-1, -1, 1)])
+def test_a_wrist_below_a_mirroring_joint(
+    library: Path, filled: tuple[Path, Path], tmp_path: Path, top: str, signs: tuple[int, ...]
+) -> None:
+    """A body that moves the same gets the same fingers in the world, however its rig counts."""
+    (body, plain), out = filled, tmp_path / "out.usdc"
+    mirrored = mirror_below(body, tmp_path / "mirrored.usdc", top, signs)
+    run("fill", mirrored, "--library", library, "-o", out, "--add-fingers")
+    clip = api.read_clip(out)
+    times = clip.time_codes[::15]
+    expected, found = (
+        joint_worlds(path, clip.origin.skeleton_path, times)[..., :3, 3] for path in (plain, out)
+    )
+    before = len(api.read_clip(body).skeleton)
+    assert found.shape[1] > before + 30
+    assert_allclose(found, expected, atol=1e-4)
+    stage = Usd.Stage.Open(str(out))
+    prim = stage.GetPrimAtPath(clip.origin.skeleton_path)
+    rest = np.array(prim.GetAttribute("restTransforms").Get())[before:, :3, :3]
+    assert_allclose(np.linalg.det(rest), 1.0)
+    bind = np.array(prim.GetAttribute("bindTransforms").Get())[:, :3, :3]
+    hand = api.find_hands(clip).character.hands["left" if top == "hand_l" else "right"]
+    assert_allclose(np.linalg.det(bind[list(hand.joints.values())]), np.prod(signs))
 
 
 @pytest.mark.real_data

@@ -20,7 +20,8 @@ from usdhand.formats.files import read_character, read_clip
 from usdhand.motion import forward_kinematics
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
-from usdhand.rigs.body import joint_points, unit
+from usdhand.motion.transforms import unit
+from usdhand.rigs.body import joint_points
 from usdhand.rigs.mapping import map_character
 
 pytestmark = pytest.mark.real_data

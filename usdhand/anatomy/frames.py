@@ -21,6 +21,7 @@ from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import unit
 
 # A thumb bone closer to the palm's normal than this has no flexion axis from geometry.
 UNDECIDED_SINE = 0.35
@@ -100,7 +101,10 @@ def hand_frames(skeleton: Skeleton, hand: HandMap, *clips: Clip) -> HandFrames:
         if not chain:
             continue
         points, tip = _digit_points(skeleton, hand, digit, chain)
-        above = palm.neutral_thumb() if digit == "Thumb" else palm.frame(points[0] - palm.wrist)
+        if digit == "Thumb":
+            above = palm.neutral_thumb()
+        else:
+            above = palm.frame(_direction(skeleton, hand.wrist, points[0] - palm.wrist))
         for name, start, end in zip(chain, points[:-1], points[1:], strict=True):
             j = hand.joints[name]
             bone = _direction(skeleton, j, end - start)
@@ -157,17 +161,17 @@ class _Palm:
                 f"The wrist and the knuckles of the {hand.side} hand lie on one line at the bind "
                 "pose, so the palm has no direction. The bind transforms are probably missing."
             )
-        forward, normal = _unit(forward), _unit(normal)
+        forward, normal = unit(forward), unit(normal)
         radial = np.cross(forward, normal) * (-1.0 if hand.side == "left" else 1.0)
-        return cls(wrist, forward, _unit(radial), normal)
+        return cls(wrist, forward, unit(radial), normal)
 
     def frame(self, bone: Array) -> Array:
         """Frame (3, 3) of a bone along the palm: flexion across it, in the palm's plane."""
-        return _frame(bone, np.cross(_unit(bone), self.normal))
+        return _frame(bone, np.cross(unit(bone), self.normal))
 
     def is_normal(self, bone: Array) -> bool:
         """Whether a bone stands on the palm, so that it has no flexion axis from geometry."""
-        return bool(np.linalg.norm(np.cross(_unit(bone), self.normal)) < UNDECIDED_SINE)
+        return bool(np.linalg.norm(np.cross(unit(bone), self.normal)) < UNDECIDED_SINE)
 
     def neutral_thumb(self) -> Array:
         """Frame (3, 3) of a relaxed thumb's metacarpal, from which the CMC is measured."""
@@ -176,8 +180,8 @@ class _Palm:
 
 
 def _frame(bone: Array, flexion_axis: Array) -> Array:
-    z = _unit(bone)
-    y = _unit(flexion_axis - z * (flexion_axis @ z))
+    z = unit(bone)
+    y = unit(flexion_axis - z * (flexion_axis @ z))
     return np.stack([np.cross(y, z), y, z], axis=1)
 
 
@@ -187,7 +191,7 @@ def _bent(above: Array, bone: Array) -> Array:
     Flexion and abduction alone lead from ``above`` to the bone, so that how far the digits were
     bent at the bind pose does not matter, be it a fist.
     """
-    x, y, z = above.T @ _unit(bone)
+    x, y, z = above.T @ unit(bone)
     flexion, abduction = np.arctan2(x, z), np.arcsin(np.clip(-y, -1.0, 1.0))
     turn = rot.multiply(_about(1, flexion), _about(0, abduction))
     return np.asarray(above @ rot.to_matrix(turn))
@@ -195,7 +199,7 @@ def _bent(above: Array, bone: Array) -> Array:
 
 def _swung(above: Array, bone: Array) -> Array:
     """Frame (3, 3) of a bone that the shortest rotation brings there from ``above``."""
-    return np.asarray(rot.to_matrix(rot.between_vectors(above[:, 2], _unit(bone))) @ above)
+    return np.asarray(rot.to_matrix(rot.between_vectors(above[:, 2], unit(bone))) @ above)
 
 
 def _about(axis: int, radians: float) -> Array:
@@ -218,7 +222,7 @@ def _flexing_as_it_moves(
     together = np.concatenate(rotations)
     away = rot.multiply(together, rot.conjugate(rot.mean(together)))
     turns = rot.to_rotation_vector(away) @ skeleton.bind_rotations[link[1]].T
-    z = _unit(bone)
+    z = unit(bone)
     turns = turns - np.outer(turns @ z, z)
     axis = np.linalg.eigh(turns.T @ turns)[1][:, -1]
     if np.degrees(np.abs(turns @ axis).max()) < LEAST_MOTION_DEG:
@@ -249,7 +253,3 @@ def _direction(skeleton: Skeleton, joint: int, bone: Array) -> Array:
             "the bind pose, so its bone has no direction. The bind transforms are probably missing."
         )
     return bone
-
-
-def _unit(v: Array) -> Array:
-    return np.asarray(v / np.linalg.norm(v))

@@ -146,9 +146,7 @@ def _channel(side: Side, joint: str) -> str:
 
 def _rest_curves(clip: Clip, hands: Hands, names: tuple[str, ...]) -> Array:
     """Channels of the hand at the bind pose, (channels,)."""
-    skeleton = clip.skeleton
-    inverse = np.linalg.inv(skeleton.bind[np.maximum(skeleton.parents, 0)])
-    local = np.where((skeleton.parents >= 0)[:, None, None], inverse @ skeleton.bind, skeleton.bind)
+    local = clip.skeleton.bind_locals
     pose = replace(
         clip,
         rotations=rot.from_matrix(local[None, :, :3, :3]),

@@ -16,6 +16,7 @@ from usdhand.errors import InputError
 from usdhand.motion import Clip, Pose, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import unit
 from usdhand.rigs.height import REFERENCE_HEIGHT_CM, body_height
 
 # No joint is farther from its parent, and no wrist, at reference height, farther from the hips:
@@ -171,7 +172,7 @@ def body_axes(skeleton: Skeleton, hands: Hands) -> Array:
     left = left - up * (left @ up)
     if np.linalg.norm(left) < 1e-6:
         return rot.IDENTITY
-    left = left / np.linalg.norm(left)
+    left = unit(left)
     return rot.from_matrix(np.stack([left, up, np.cross(left, up)], axis=1))
 
 

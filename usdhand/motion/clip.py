@@ -9,6 +9,7 @@ import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
+from usdhand.motion.transforms import decompose_trs
 from usdhand.problems import Problem
 
 
@@ -48,7 +49,7 @@ class Clip:
     ----------
     rotations : (frames, joints, 4) joint-to-parent unit quaternions (x, y, z, w), continuous
     translations : (frames, joints, 3) joint-to-parent, cm
-    scales : (frames, joints, 3); all ones for nearly every clip
+    scales : (frames, joints, 3); all ones for nearly every clip, all negative for a mirrored joint
     fps : frames a second
     """
 
@@ -60,6 +61,16 @@ class Clip:
     name: str = ""
     origin: Origin = field(default_factory=Origin)
     problems: tuple[Problem, ...] = ()
+
+    @classmethod
+    def at_bind_pose(
+        cls, skeleton: Skeleton, name: str, origin: Origin, problems: tuple[Problem, ...] = ()
+    ) -> Clip:
+        """Return one frame of a skeleton at its bind pose, with a time code a frame."""
+        translations, rotations, _ = decompose_trs(skeleton.bind_locals[None])
+        scales = np.ones_like(translations)
+        fps = origin.time_codes_per_second
+        return cls(skeleton, rotations, translations, scales, fps, name, origin, problems)
 
     def __len__(self) -> int:
         return len(self.rotations)

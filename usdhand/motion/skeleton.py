@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import local_matrices, orientation
 
 
 def leaf_name(joint: str) -> str:
@@ -83,11 +84,13 @@ class Skeleton:
 
     @cached_property
     def bind_rotations(self) -> Array:
-        """(joints, 3, 3) world orientations at the bind pose, without scale or shear."""
-        u, _, vt = np.linalg.svd(self.bind[:, :3, :3])
-        sign = np.sign(np.linalg.det(u @ vt))
-        u[:, :, 2] *= sign[:, None]
-        return np.asarray(u @ vt)
+        """(joints, 3, 3) world orientations at the bind pose, without scale, shear or mirroring."""
+        return orientation(self.bind[:, :3, :3])
+
+    @cached_property
+    def bind_locals(self) -> Array:
+        """(joints, 4, 4) joint-to-parent matrices of the bind pose."""
+        return local_matrices(self.bind, self.parents)
 
     @cached_property
     def order(self) -> tuple[int, ...]:

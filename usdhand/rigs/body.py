@@ -10,13 +10,9 @@ import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
+from usdhand.motion.transforms import unit
 
 Chain = tuple[int, ...]
-
-
-def unit(v: Array) -> Array:
-    """Vector (3,) scaled to length 1; a zero vector stays zero."""
-    return np.asarray(v / max(float(np.linalg.norm(v)), 1e-12))
 
 
 def joint_points(skeleton: Skeleton) -> Array:
@@ -27,7 +23,7 @@ def joint_points(skeleton: Skeleton) -> Array:
     """
     world, parents = np.nan_to_num(skeleton.bind), skeleton.parents
     if not np.ptp(world[:, :3, 3], axis=0).any():
-        return _rest_points(skeleton)
+        return np.asarray(skeleton.accumulated(np.nan_to_num(skeleton.rest))[:, :3, 3])
     misplaced = _misplaced(skeleton)
     for joint in skeleton.order:
         if joint not in misplaced:
@@ -63,21 +59,6 @@ def _misplaced(skeleton: Skeleton) -> set[int]:
         if skeleton.parents[joint] >= 0
         and _bone(skeleton, joint) > _ABSURD * _bone(skeleton, int(skeleton.parents[joint]))
     }
-
-
-def _rest_points(skeleton: Skeleton) -> Array:
-    world = np.nan_to_num(skeleton.rest)
-    for joint in skeleton.order:
-        if (parent := skeleton.parents[joint]) >= 0:
-            world[joint] = world[parent] @ world[joint]
-    return np.asarray(world[:, :3, 3])
-
-
-def common_ancestor(skeleton: Skeleton, joints: Iterable[int]) -> int | None:
-    """Lowest joint above all ``joints`` (one of them may be it), None if they share none."""
-    lines = [(j, *skeleton.ancestors(j)) for j in joints]
-    shared = set(lines[0]).intersection(*lines[1:])
-    return next((j for j in lines[0] if j in shared), None)
 
 
 def arm_joints(skeleton: Skeleton, points: Array, wrist: int, chest: int | None) -> dict[str, int]:
@@ -126,7 +107,7 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
     toes say what is in front.
     """
     up = np.array([0.0, 1.0, 0.0])
-    chest = common_ancestor(skeleton, wrists) if len(wrists) > 1 else None
+    chest = skeleton.common_ancestor(wrists) if len(wrists) > 1 else None
     if chest is None or chest in wrists:
         return Body({}, up, None)
     heights = heights_of(skeleton)

@@ -13,9 +13,10 @@ from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import affine, rigid, unit
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.rigs.bare import BareArms, bare_arms, finger_names
-from usdhand.rigs.body import body_of, joint_points, unit
+from usdhand.rigs.body import body_of, joint_points
 from usdhand.rigs.conventions import METACARPALS, TIPS
 from usdhand.rigs.height import body_height
 
@@ -135,8 +136,9 @@ def _with_hand(clip: Clip, arms: BareArms, shape: HandShape, names: Mapping[str,
     palm = palm_of(skeleton, arms, shape.side)
     size = _size(skeleton, arms, shape)
     wrist = skeleton.bind[hand.wrist]
-    # Joints stand in the wrist's space, whose scale (of an exporter's root joint) they must undo.
-    scale = float(np.cbrt(abs(np.linalg.det(wrist[:3, :3]))))
+    # Joints stand in the wrist's space, whose scale (of an exporter's root joint) they must undo;
+    # it is negative where something above mirrors.
+    scale = float(np.cbrt(np.linalg.det(wrist[:3, :3])))
     joints, parents = list(skeleton.joints), skeleton.parents.tolist()
     bind, rest = list(skeleton.bind), list(skeleton.rest)
     index = {"": hand.wrist}
@@ -146,15 +148,13 @@ def _with_hand(clip: Clip, arms: BareArms, shape: HandShape, names: Mapping[str,
             above = shape.parents[above]
         if role not in names:
             continue
-        world = np.eye(4)
-        world[:3, :3] = scale * palm @ turn
-        world[:3, 3] = wrist[:3, 3] + size * palm @ position
+        world = affine(scale * palm @ turn, wrist[:3, 3] + size * palm @ position)
         parent = index[above]
         index[role] = len(joints)
         joints.append(f"{joints[parent]}/{names[role]}")
         parents.append(parent)
         bind.append(world)
-        rest.append(_rigid(np.linalg.inv(bind[parent]) @ world))
+        rest.append(rigid(np.linalg.inv(bind[parent]) @ world))
     local = np.array(rest[len(skeleton) :])
     return replace(
         clip,
@@ -234,13 +234,6 @@ def _forearm(skeleton: Skeleton, hand: HandMap) -> float | None:
         return None
     points = skeleton.bind_positions
     return float(np.linalg.norm(points[hand.wrist] - points[hand.elbow])) or None
-
-
-def _rigid(matrix: Array) -> Array:
-    u, _, vt = np.linalg.svd(matrix[:3, :3])
-    result = matrix.copy()
-    result[:3, :3] = u @ vt
-    return result
 
 
 def _extended(

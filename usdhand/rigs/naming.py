@@ -26,7 +26,7 @@ from usdhand.anatomy.hand import (
 from usdhand.errors import HandNotFoundError
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
-from usdhand.rigs.body import common_ancestor, joint_points
+from usdhand.rigs.body import joint_points
 from usdhand.rigs.conventions import (
     METACARPALS,
     THUMB_CARPAL,
@@ -296,7 +296,7 @@ def _hand(rig: NamedJoints, side: Side, roles: Candidates, notes: list[str]) -> 
 def _wrist(rig: NamedJoints, side: Side, roles: Candidates) -> int | None:
     fingers = [j for f in FINGERS for j in roles.get(f + "MCP", ())]
     if "wrist" not in roles:
-        meeting = common_ancestor(rig.skeleton, fingers)
+        meeting = rig.skeleton.common_ancestor(fingers)
         return None if meeting in fingers else meeting
     below = {w: sum(w in rig.above[j] for j in fingers) for w in roles["wrist"]}
     best = [w for w in below if below[w] == max(below.values())]

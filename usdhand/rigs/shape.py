@@ -10,7 +10,8 @@ import numpy as np
 from usdhand.anatomy.hand import FINGERS, HandMap, Side, digit_joints
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
-from usdhand.rigs.body import Chain, body_of, common_ancestor, heights_of, unit
+from usdhand.motion.transforms import unit
+from usdhand.rigs.body import Chain, body_of, heights_of
 
 
 @dataclass(frozen=True)
@@ -202,7 +203,7 @@ def _read_hand(
 def _shared_by_most(skeleton: Skeleton, root: int, chains: Sequence[Chain]) -> int | None:
     """Return the joint below ``root`` that carries all chains but one, if there is one."""
     for left_out in chains:
-        joint = common_ancestor(skeleton, [c[0] for c in chains if c is not left_out])
+        joint = skeleton.common_ancestor([c[0] for c in chains if c is not left_out])
         if joint is not None and joint != root:
             return joint
     return None

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import unit
 from usdhand.splice.markers import Markers, shown_at
 from usdhand.splice.phases import alike, smoothed
 from usdhand.splice.settings import Align
@@ -70,11 +71,11 @@ def _compared(body: Markers, hand: Markers) -> Iterator[tuple[Array, Array, floa
     def around(curve: Array) -> Array:
         return np.asarray(curve - smoothed(curve, AROUND_S * fps))
 
-    bends = (_unit(smoothed(m.forearm, SMOOTHING_S * fps)) for m in (body, hand))
+    bends = (unit(smoothed(m.forearm, SMOOTHING_S * fps)) for m in (body, hand))
     yield *bends, LEAST_ANGLE
     positions = [smoothed(m.positions, SMOOTHING_S * fps) for m in (body, hand)]
     wrists = [(p[:, 0] + p[:, 1]) / 2 for p in positions]
-    palms = (_unit(p[:, [0, 3]] - w[:, None]) for p, w in zip(positions, wrists, strict=True))
+    palms = (unit(p[:, [0, 3]] - w[:, None]) for p, w in zip(positions, wrists, strict=True))
     ours, theirs = (around(p.reshape(len(p), -1)) for p in palms)
     yield ours, theirs, LEAST_ANGLE
     ours, theirs = (around(w) for w in wrists)
@@ -85,7 +86,3 @@ def _compared(body: Markers, hand: Markers) -> Iterator[tuple[Array, Array, floa
 
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray(np.einsum("ti,ti->t", a, b))
-
-
-def _unit(v: Array) -> Array:
-    return np.asarray(v / np.maximum(np.sqrt(np.einsum("...i,...i", v, v))[..., None], 1e-9))

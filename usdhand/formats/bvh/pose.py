@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.formats.guess import FOOT, HEAD, bone_ways
 from usdhand.motion import Clip, Problem, Skeleton, forward_kinematics
-from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import compose_trs
 
 # A body stands if head and feet are at least so much of the length of the bones between them and
 # the hips above and below these. Rest poses of real files have 0.85 and more, or about nothing.
@@ -25,14 +27,9 @@ def posed_skeleton(
     parents : parents before their children
     rotations, translations : (joints, 4) and (joints, 3), joint-to-parent
     """
-    rest = np.tile(np.eye(4), (len(joints), 1, 1))
-    rest[:, :3, :3] = rot.to_matrix(rotations)
-    rest[:, :3, 3] = translations
-    bind = rest.copy()
-    for joint, parent in enumerate(parents):
-        if parent >= 0:
-            bind[joint] = bind[parent] @ rest[joint]
-    return Skeleton(joints, parents, bind, rest)
+    rest = compose_trs(translations, rotations)
+    skeleton = Skeleton(joints, parents, rest, rest)
+    return replace(skeleton, bind=skeleton.accumulated(rest))
 
 
 def choose_bind(zero: Clip, clip: Clip) -> tuple[Skeleton, tuple[Problem, ...]]:

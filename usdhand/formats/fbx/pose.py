@@ -11,6 +11,14 @@ from usdhand.formats.fbx.scene import Scene, Transforms
 from usdhand.motion import Problem
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import (
+    affine,
+    compose_trs,
+    mean_scale,
+    nearest_rotation,
+    orientation,
+    with_even_signs,
+)
 
 SAME_SCALE = 1e-5  # scales this close to one are rounding
 SHEAR = 1e-3  # of a joint's axes, that no scale of joints can represent
@@ -35,8 +43,7 @@ def right_handed(scene: Scene, axes: Array) -> Scene:
     """The scene with these axes; mirrored, if they are left-handed."""
     if np.linalg.det(axes) > 0:
         return replace(scene, axes=axes)
-    flip = np.eye(4)
-    flip[:3, :3] = MIRROR
+    flip = affine(MIRROR, np.zeros(3))
     sampled = scene.sampled
     if sampled is not None:
         sampled = replace(sampled, transforms=_mirrored(sampled.transforms))
@@ -99,11 +106,12 @@ def joint_locals(
             inverse = _inverse(linear[above])
             place = world.positions[node] - world.positions[above]
         else:
-            sizes[node] = _size(world.linear[above]) if above >= 0 else 1.0
+            sizes[node] = float(mean_scale(world.linear[above][0])) if above >= 0 else 1.0
+            sizes[node] = sizes[node] or 1.0  # of what is flat anyway
             inverse = np.eye(3)
             place = world.positions[node]
             if above >= 0:
-                turned = rot.from_matrix(rigid(axes @ world.linear[above]))
+                turned = rot.from_matrix(nearest_rotation(axes @ world.linear[above]))
                 rotations[:, i] = rot.multiply(turned, rotations[:, i])
         translations[:, i] = (inverse @ axes @ place[..., None])[..., 0] * unit
         turn = rot.to_matrix(rotations[:, i])
@@ -115,6 +123,7 @@ def joint_locals(
         scales[:, i] = np.where(np.abs(scale - 1.0) < SAME_SCALE, 1.0, scale)
         turn = turn * scales[:, i, None, :]
         linear[node] = linear[above] @ turn if above in linear else turn
+    rotations, scales = with_even_signs(rotations, scales)
     return Transforms(translations, rotations, scales), _shear_problem(scene, sheared)
 
 
@@ -125,13 +134,12 @@ def bind_matrices(scene: Scene, nodes: Sequence[int], rest: Transforms) -> Array
     is nothing to hang on, all stand as at rest.
     """
     world = world_transforms(scene, scene.rest, nodes)
-    local = matrices(rest.rotations[0], rest.translations[0])
+    local = compose_trs(rest.translations[0], rest.rotations[0])
     bind = dict[int, Array]()
     bound = set[int]()
     for i, node in enumerate(nodes):
         above = int(scene.parents[node])
-        matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = world.linear[node][0], world.positions[node][0]
+        matrix = affine(world.linear[node][0], world.positions[node][0])
         if node in scene.bind or above in bound:
             bound.add(node)
         if node in bound and node not in scene.bind:
@@ -141,27 +149,11 @@ def bind_matrices(scene: Scene, nodes: Sequence[int], rest: Transforms) -> Array
     return np.stack([bind[node] for node in nodes])
 
 
-def matrices(rotations: Array, translations: Array) -> Array:
-    """Matrices (joints, 4, 4) of rotations (joints, 4) and translations (joints, 3)."""
-    found = np.tile(np.eye(4), (len(rotations), 1, 1))
-    found[:, :3, :3] = rot.to_matrix(rotations)
-    found[:, :3, 3] = translations
-    return found
-
-
-def rigid(linear: Array) -> Array:
-    """Matrices (..., 3, 3) without scale, shear and reflection."""
-    u, _, vt = np.linalg.svd(linear)
-    u[..., :, 2] *= np.where(np.linalg.det(u @ vt) < 0, -1.0, 1.0)[..., None]
-    return np.asarray(u @ vt)
-
-
 def _placed(scene: Scene, matrix: Array) -> Array:
     """A world matrix of the file, without scale, in Y-up centimetres."""
-    found = np.eye(4)
-    found[:3, :3] = rigid(scene.axes @ matrix[:3, :3])
-    found[:3, 3] = scene.axes @ matrix[:3, 3] * scene.cm_per_unit
-    return found
+    return affine(
+        orientation(scene.axes @ matrix[:3, :3]), scene.axes @ matrix[:3, 3] * scene.cm_per_unit
+    )
 
 
 def _mirrored(transforms: Transforms) -> Transforms:
@@ -179,12 +171,6 @@ def _with_ancestors(scene: Scene, nodes: Iterable[int]) -> set[int]:
             found.add(node)
             node = int(scene.parents[node])
     return found
-
-
-def _size(linear: Array) -> float:
-    """Mean factor by which a transform enlarges, at its first frame; 1 where it is zero."""
-    singular = np.linalg.svd(linear[0], compute_uv=False)
-    return float(np.exp(np.log(singular).mean())) if singular.min() > 1e-12 else 1.0
 
 
 def _inverse(linear: Array) -> Array:

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from usdhand.errors import InputError
-from usdhand.formats.fbx.pose import bind_matrices, joint_locals, matrices, right_handed
+from usdhand.formats.fbx.pose import bind_matrices, joint_locals, right_handed
 from usdhand.formats.fbx.scene import Sampled, Scene, load_scene
 from usdhand.formats.fbx.skeletons import FbxSkeleton, find_skeleton, find_take, keyed_takes
 from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP
+from usdhand.motion.transforms import compose_trs
 
 DEFAULT_FPS = 30.0  # what FBX programs play a file at that does not say
 
@@ -95,22 +96,8 @@ def read_character(
     """
     scene = _meant(load_scene(path, sample=False), cm_per_unit, up)
     rig = find_skeleton(scene, skel, frozenset().union(*(take.moved for take in scene.takes)))
-    skeleton = _skeleton(scene, rig)
-    parents, bind = skeleton.parents, skeleton.bind
-    above = np.where((parents >= 0)[:, None, None], bind[parents], np.eye(4))
-    local = np.linalg.inv(above) @ bind
-    translations = local[None, :, :3, 3]
-    origin = _origin(scene, rig)
-    return Clip(
-        skeleton,
-        rot.from_matrix(local[None, :, :3, :3]),
-        translations,
-        np.ones_like(translations),
-        origin.time_codes_per_second,
-        path.stem,
-        origin,
-        (*rig.problems, *_scene_problems(scene, rig)),
-    )
+    problems = (*rig.problems, *_scene_problems(scene, rig))
+    return Clip.at_bind_pose(_skeleton(scene, rig), path.stem, _origin(scene, rig), problems)
 
 
 def animation_names(path: Path) -> tuple[str, ...]:
@@ -139,7 +126,7 @@ def _skeleton(scene: Scene, rig: FbxSkeleton) -> Skeleton:
         rig.joints,
         parents_from_paths(rig.joints),
         bind_matrices(scene, rig.nodes, rest),
-        matrices(rest.rotations[0], rest.translations[0]),
+        compose_trs(rest.translations[0], rest.rotations[0]),
     )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from usdhand.formats.gltf.document import LARGEST, Document, Element
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import compose_trs, decompose_trs
 
 MOST_DEEP = 500
 SHORTEST = 1e-6  # norm below which a quaternion has no direction
@@ -44,7 +45,7 @@ class Tree:
     @cached_property
     def world(self) -> Array:
         """(nodes, 4, 4) node-to-world matrices of the default pose, file units."""
-        world = matrices(self.translations, self.rotations, self.scales)
+        world = compose_trs(self.translations, self.rotations, self.scales)
         for node in self.order:
             parent = self.parents[node]
             if parent >= 0:
@@ -130,22 +131,6 @@ def read_tree(document: Document) -> Tree:
     return Tree(elements, parents, tuple(children), tuple(order), translations, rotations, scales)
 
 
-def matrices(translations: Array, rotations: Array, scales: Array) -> Array:
-    """Matrices (..., 4, 4) that scale, then rotate, then translate."""
-    result = np.zeros((*rotations.shape[:-1], 4, 4))
-    result[..., :3, :3] = rot.to_matrix(rotations) * scales[..., None, :]
-    result[..., :3, 3] = translations
-    result[..., 3, 3] = 1.0
-    return result
-
-
-def rigid(linear: Array) -> Array:
-    """Rotations nearest to matrices (..., 3, 3): no scale, shear or reflection."""
-    u, _, vt = np.linalg.svd(linear)
-    u[..., :, 2] *= np.where(np.linalg.det(u @ vt) < 0, -1.0, 1.0)[..., None]
-    return np.asarray(u @ vt)
-
-
 def _transforms(elements: list[Element]) -> tuple[Array, Array, Array]:
     count = len(elements)
     translations, rotations = np.zeros((count, 3)), np.tile(rot.IDENTITY, (count, 1))
@@ -153,11 +138,7 @@ def _transforms(elements: list[Element]) -> tuple[Array, Array, Array]:
     for i, element in enumerate(elements):
         if (matrix := element.get("matrix")) is not None:
             m = np.array(matrix.numbers(16)).reshape(4, 4).T
-            translations[i] = m[:3, 3]
-            # What a matrix has of mirroring goes into its scale, so that nothing is lost.
-            sign = -1.0 if np.linalg.det(m[:3, :3]) < 0 else 1.0
-            rotations[i] = rot.from_matrix(rigid(m[:3, :3] * sign))
-            scales[i] = np.linalg.norm(m[:3, :3], axis=0) * sign
+            translations[i], rotations[i], scales[i] = decompose_trs(m)
             continue
         if (found := element.get("translation")) is not None:
             translations[i] = found.numbers(3)

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from usdhand.formats.above import scale_problems
 from usdhand.formats.gltf.curves import Curves, evaluate
 from usdhand.formats.gltf.document import LARGEST
-from usdhand.formats.gltf.nodes import Tree, matrices, rigid
+from usdhand.formats.gltf.nodes import Tree
 from usdhand.formats.gltf.timing import Timing
 from usdhand.motion import Problem
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import compose_trs, mean_scale, nearest_rotation, with_even_signs
 
 UNEVEN_SCALE = 2e-6  # relative: what rounding leaves of scales that are meant to be even
-UNEVEN_ABOVE = 0.01
-SMALLEST_SCALE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def find_placement(
     kept = np.where(folded == 1.0, np.abs(_steady(scales)).max(axis=(0, 2)), 1.0)
     rotations: dict[int, Array] = {}
     translations: dict[int, Array] = {}
-    problems: dict[str, Problem] = {}
+    problems: dict[str, Problem] = {}  # by code
     chains: dict[int, Array] = {}  # roots mostly share what stands above them
     for joint, parent in enumerate(parents):
         if parent >= 0:
@@ -115,13 +115,13 @@ def find_placement(
             top = int(tree.parents[nodes[joint]])
             if top not in chains:
                 chains[top] = _chain(tree, nodes[joint], motion)
-                problems |= _odd_above(chains[top], tree.name(top)) if top >= 0 else {}
+                odd = scale_problems(chains[top][:, :3, :3], tree.name(top)) if top >= 0 else ()
+                problems |= {problem.code: problem for problem in odd}
             above = chains[top]
-            singular = np.linalg.svd(above[0, :3, :3], compute_uv=False)
-            if singular.min() < SMALLEST_SCALE or "zero-scale" in problems:
+            if "zero-scale" in problems:
                 tree.elements[nodes[joint]].refuse("stands below a zero scale")
-            lengths[joint] = float(np.exp(np.log(singular).mean())) * space.unit
-            rotations[joint] = space.axes @ rigid(above[:, :3, :3])
+            lengths[joint] = float(mean_scale(above[0, :3, :3])) * space.unit
+            rotations[joint] = space.axes @ nearest_rotation(above[:, :3, :3])
             translations[joint] = above[:, :3, 3] @ space.axes.T * space.unit
         if not lengths[joint] * growth[joint] <= LARGEST:
             tree.elements[nodes[joint]].refuse("stands below too large a scale")
@@ -142,7 +142,8 @@ def placed(
     even = np.abs(_steady(s) - placement.folded[:, None]).max(axis=(0, 2)) <= (
         UNEVEN_SCALE * placement.folded
     )
-    return q, t, ones if even.all() else np.where(even[:, None], 1.0, s)
+    q, s = with_even_signs(q, ones if even.all() else np.where(even[:, None], 1.0, s))
+    return q, t, s
 
 
 def _chain(tree: Tree, joint: int, motion: Motion) -> Array:
@@ -153,34 +154,10 @@ def _chain(tree: Tree, joint: int, motion: Motion) -> Array:
     q, t, s = sampled(tree, above, motion)
     result = np.eye(4)[None]
     for place in range(len(above)):
-        result = result @ matrices(t[:, place], q[:, place], s[:, place])
+        result = result @ compose_trs(t[:, place], q[:, place], s[:, place])
     if not (np.abs(result) <= LARGEST).all():
         tree.elements[joint].refuse("stands beyond any sensible distance or scale")
     return np.asarray(result)
-
-
-def _odd_above(above: Array, where: str) -> dict[str, Problem]:
-    """What a clip cannot represent of the transforms above a skeleton."""
-    linear = above[:, :3, :3]
-    singular = np.linalg.svd(linear, compute_uv=False)
-    largest, smallest = singular.max(axis=1), singular.min(axis=1)
-    uneven = UNEVEN_ABOVE * smallest
-    found = {
-        "zero-scale": ((smallest < SMALLEST_SCALE).any(), "a zero scale stands above the skeleton"),
-        "non-uniform-scale": (
-            (largest > smallest + uneven).any(),
-            "a non-uniform scale stands above the skeleton: bones are read with its mean",
-        ),
-        "mirrored": (
-            (np.linalg.det(linear) < 0).any(),
-            "a mirroring stands above the skeleton: sides may swap",
-        ),
-        "animated-scale": (
-            (np.abs(smallest - smallest[0]) > uneven[0]).any(),
-            "the scale above the skeleton changes over time: that of the first frame is read",
-        ),
-    }
-    return {code: Problem(code, text, where) for code, (there, text) in found.items() if there}
 
 
 def _even_scales(s: Array) -> Array:

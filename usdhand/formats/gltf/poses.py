@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from usdhand.formats.gltf.accessors import read_rows
 from usdhand.formats.gltf.characters import GltfCharacter, GltfSkin
 from usdhand.formats.gltf.document import Document
-from usdhand.formats.gltf.nodes import Tree, rigid
+from usdhand.formats.gltf.nodes import Tree
 from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import affine, orientation
 
 SAME_LENGTH = 0.05  # relative difference of bones of one skeleton in two poses
 SAME_PLACE = 1e-3  # of the character's size: two skins agree on a joint
@@ -133,6 +134,4 @@ def _distance(bound: Array, posed: Array) -> float:
 
 
 def _without_scale(matrices: Array) -> Array:
-    result = matrices.copy()
-    result[:, :3, :3] = rigid(matrices[:, :3, :3])
-    return result
+    return affine(orientation(matrices[:, :3, :3]), matrices[:, :3, 3])

@@ -12,14 +12,14 @@ from usdhand.errors import InputError
 from usdhand.formats.gltf.characters import GltfCharacter, find_character
 from usdhand.formats.gltf.curves import choose, moved_nodes, names_of, read_curves
 from usdhand.formats.gltf.document import Document, read_document, unused
-from usdhand.formats.gltf.nodes import Tree, matrices, read_tree
+from usdhand.formats.gltf.nodes import Tree, read_tree
 from usdhand.formats.gltf.placement import Motion, Space, find_placement, placed, sampled
 from usdhand.formats.gltf.poses import bind_matrices
 from usdhand.formats.gltf.timing import DEFAULT_FPS, Timing, find_timing
 from usdhand.formats.gltf.vrm import Humanoid, read_humanoid
 from usdhand.motion import Clip, Origin, Problem, Skeleton
-from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP
+from usdhand.motion.transforms import compose_trs
 
 CM_PER_UNIT = 100.0
 MOST_VALUES = 20_000_000  # frames times joints: 55 minutes of 100 joints at 60 fps
@@ -155,21 +155,8 @@ def _animated(scene: _Scene, animation: str | None, cm: float | None, up: str | 
 
 def _still(scene: _Scene, cm: float | None, up: str | None) -> Clip:
     skeleton, problems = _skeleton(scene, cm, up)
-    parents = skeleton.parents
-    inverse = np.linalg.inv(skeleton.bind)
-    over = np.where((parents >= 0)[:, None, None], inverse[parents], np.eye(4))
-    local = over @ skeleton.bind
     origin = replace(_origin(scene, cm, up), time_codes_per_second=DEFAULT_FPS)
-    return Clip(
-        skeleton,
-        rot.from_matrix(local[None, :, :3, :3]),
-        local[None, :, :3, 3].copy(),
-        np.ones((1, len(parents), 3)),
-        DEFAULT_FPS,
-        scene.document.path.stem,
-        origin,
-        problems,
-    )
+    return Clip.at_bind_pose(skeleton, scene.document.path.stem, origin, problems)
 
 
 def _skeleton(
@@ -181,7 +168,7 @@ def _skeleton(
     q, t, s = sampled(tree, nodes, pose)
     placement, odd = find_placement(tree, nodes, parents, s, pose, space)
     q, t, _ = placed(q, t, s, parents, placement)
-    rest = matrices(t[0], q[0], np.ones_like(t[0]))
+    rest = compose_trs(t[0], q[0])
     bind, problems = bind_matrices(scene.document, tree, scene.character, parents)
     bind[:, :3] = space.axes @ bind[:, :3]
     bind[:, :3, 3] *= space.unit

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from usdhand.errors import InputError
 from usdhand.formats.gltf.document import BINARY_CHUNK, JSON_CHUNK, MAGIC
-from usdhand.formats.gltf.nodes import rigid
 from usdhand.motion import Clip, Problem, Skeleton
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import decompose_trs
 from usdhand.version import __version__
 
 METRES = 0.01  # of a centimetre
@@ -129,12 +129,8 @@ class _Rest:
 
 
 def _rest(skeleton: Skeleton) -> _Rest:
-    linear = skeleton.rest[:, :3, :3]
-    return _Rest(
-        rot.from_matrix(rigid(linear)),
-        skeleton.rest[:, :3, 3],
-        np.linalg.norm(linear, axis=1),
-    )
+    translation, rotation, scale = decompose_trs(skeleton.rest)
+    return _Rest(rotation, translation, scale)
 
 
 def _inverse_bind(skeleton: Skeleton) -> Array:

@@ -13,6 +13,7 @@ from usdhand.formats.usd.names import author_names, legal_name, legal_skeleton
 from usdhand.formats.usd.stage import Character
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
+from usdhand.motion.transforms import affine
 
 METERS_PER_UNIT = 0.01
 
@@ -71,8 +72,7 @@ def _define_skeleton(stage: Usd.Stage, path: Sdf.Path, source: Skeleton, up: str
     skeleton = UsdSkel.Skeleton.Define(stage, path)
     bind, rest = source.bind.copy(), source.rest.copy()
     if up == "Z":
-        turn = np.eye(4)
-        turn[:3, :3] = Y_UP_FROM_Z_UP.T
+        turn = affine(Y_UP_FROM_Z_UP.T, np.zeros(3))
         roots = source.parents < 0
         bind, rest[roots] = turn @ bind, turn @ rest[roots]
     skeleton.CreateJointsAttr(Vt.TokenArray(list(source.joints)))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usdhand.formats.output import check_output
@@ -30,6 +29,7 @@ from usdhand.formats.usd.write import (
 )
 from usdhand.motion import Clip, Problem
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import local_matrices
 
 # Problems of a clip whose animation is written again to mend them.
 MENDED = {"missing-translations", "missing-scales"}
@@ -249,16 +249,6 @@ def _local_in_file(character: Character, clip: Clip) -> Array:
     """Joint-to-parent matrices (n, 4, 4) of the clip's bind pose in the file's units and axes."""
     world = world_above(character.skeleton)
     skeleton = clip.skeleton
-    above = _matrix(world.rotation[0], world.translation[0])
-    parents = np.where(
-        (skeleton.parents >= 0)[:, None, None], skeleton.bind[skeleton.parents], above
-    )
-    local = np.linalg.inv(parents) @ skeleton.bind
+    local = local_matrices(skeleton.bind, skeleton.parents, world.first)
     local[:, :3, 3] /= world.scale
-    return np.asarray(local)
-
-
-def _matrix(rotation: Array, translation: Array) -> Array:
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation, translation
-    return matrix
+    return local

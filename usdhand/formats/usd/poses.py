@@ -11,8 +11,8 @@ from pxr import UsdSkel
 from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import World
 from usdhand.motion import Problem, Skeleton
-from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import affine, local_matrices, rigid, unit
 
 MISPLACED_BIND_CM = 1.0
 
@@ -31,8 +31,7 @@ class AuthoredPoses:
     def bind_locals(self, parents: NDArray[np.intp]) -> Array:
         """Joint-to-parent matrices of the bind pose, of the rest pose where there is no bind."""
         if self.bind is not None:
-            above = np.where((parents >= 0)[:, None, None], self.bind[parents], np.eye(4))
-            return rigid(np.linalg.inv(above) @ self.bind)
+            return rigid(local_matrices(self.bind, parents))
         if self.rest is not None:
             return rigid(self.rest)
         return np.broadcast_to(np.eye(4), (len(parents), 4, 4))
@@ -68,14 +67,14 @@ def placed_skeleton(
     """
     rest = poses.neutral_locals(parents).copy()
     roots = parents < 0
-    rest[roots] = _transformed(rest[roots], world.rotation[0], world.translation[0])
+    rest[roots] = world.first @ rest[roots]
     skeleton = Skeleton(joints, parents, first_frame, rest)
     if poses.bind is None:
         local = rest if poses.rest is not None else first_frame
         return replace(skeleton, bind=skeleton.accumulated(local)), ()
     posed = skeleton.accumulated(first_frame)
-    in_skeleton_space = _transformed(poses.bind, world.rotation[0], world.translation[0])
-    in_world_space = _transformed(poses.bind, world.axes, np.zeros(3))
+    in_skeleton_space = world.first @ poses.bind
+    in_world_space = affine(world.axes, np.zeros(3)) @ poses.bind
     # UsdSkel's documentation says world space, Blender writes skeleton space, Maya world space.
     bind = max(
         (in_skeleton_space, in_world_space),
@@ -83,23 +82,6 @@ def placed_skeleton(
     )
     identity = np.abs(poses.bind - np.eye(4)).max(axis=(1, 2)) < 1e-6
     return _repair_unskinned(replace(skeleton, bind=bind), first_frame, identity)
-
-
-def rigid(matrices: Array) -> Array:
-    """Matrices (..., 4, 4) without scale, shear and reflection."""
-    u, _, vt = np.linalg.svd(matrices[..., :3, :3])
-    u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
-    result = matrices.copy()
-    result[..., :3, :3] = u @ vt
-    return result
-
-
-def local_matrices(rotations: Array, translations: Array) -> Array:
-    """Matrices (joints, 4, 4) of rotations (joints, 4) and translations (joints, 3)."""
-    matrices = np.tile(np.eye(4), (len(rotations), 1, 1))
-    matrices[:, :3, :3] = rot.to_matrix(rotations)
-    matrices[:, :3, 3] = translations
-    return matrices
 
 
 def _matrices(value: object, count: int, scale: float) -> Array | None:
@@ -113,18 +95,10 @@ def _matrices(value: object, count: int, scale: float) -> Array | None:
     return matrices
 
 
-def _transformed(matrices: Array, rotation: Array, translation: Array) -> Array:
-    result = matrices.copy()
-    result[:, :3, :3] = rotation @ matrices[:, :3, :3]
-    result[:, :3, 3] = matrices[:, :3, 3] @ rotation.T + translation
-    return result
-
-
 def _bones(matrices: Array, parents: NDArray[np.intp]) -> Array:
     children = np.flatnonzero(parents >= 0)
     bones = matrices[children, :3, 3] - matrices[parents[children], :3, 3]
-    length = np.linalg.norm(bones, axis=1, keepdims=True)
-    return np.asarray(bones / np.maximum(length, 1e-9))
+    return unit(bones)
 
 
 def _agreement(bones: Array, posed: Array, parents: NDArray[np.intp]) -> float:

@@ -21,13 +21,14 @@ from usdhand.formats.usd.curves import (
     read_curve,
 )
 from usdhand.formats.usd.names import illegal_names, legal_name, with_names
-from usdhand.formats.usd.poses import AuthoredPoses, authored_poses, local_matrices, placed_skeleton
+from usdhand.formats.usd.poses import AuthoredPoses, authored_poses, placed_skeleton
 from usdhand.formats.usd.samples import Track, steady
 from usdhand.formats.usd.stage import Character, damage_refused, find_character
 from usdhand.formats.usd.world import World, world_above, world_problems
 from usdhand.motion import Clip, Origin, Problem, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import compose_trs, with_even_signs
 
 # Rates that a file may mean; beyond, its time codes are something else.
 SLOWEST_FPS, FASTEST_FPS = 0.1, 10_000.0
@@ -93,8 +94,9 @@ def _animated_clip(character: Character) -> Clip:
     rotations, translations, scales = _curves(
         tracks.at(times), joints, targets, poses, world, len(times)
     )
+    rotations, scales = with_even_signs(rotations, scales)
     q, t = _place(rotations, translations, parents, world)
-    skeleton, repaired = placed_skeleton(joints, parents, poses, world, local_matrices(q[0], t[0]))
+    skeleton, repaired = placed_skeleton(joints, parents, poses, world, compose_trs(t[0], q[0]))
     skeleton = with_names(skeleton, character.skeleton)
     step = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
     origin = replace(
@@ -130,7 +132,7 @@ def _still_clip(character: Character) -> Clip:
     q, t = _place(
         rot.from_matrix(local[None, :, :3, :3]), local[None, :, :3, 3].copy(), parents, world
     )
-    skeleton, repaired = placed_skeleton(joints, parents, poses, world, local_matrices(q[0], t[0]))
+    skeleton, repaired = placed_skeleton(joints, parents, poses, world, compose_trs(t[0], q[0]))
     skeleton = with_names(skeleton, character.skeleton)
     problems = (
         *character.problems,

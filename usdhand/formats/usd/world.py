@@ -8,10 +8,10 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from usdhand.errors import InputError
+from usdhand.formats.above import scale_problems
 from usdhand.motion import Problem
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
-
-UNIFORM_SCALE_TOLERANCE = 0.01
+from usdhand.motion.transforms import affine, mean_scale, nearest_rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +27,11 @@ class World:
     translation: Array
     axes: Array
 
+    @property
+    def first(self) -> Array:
+        """(4, 4) of the first frame, without the scale."""
+        return affine(self.rotation[0], self.translation[0])
+
 
 def world_above(skeleton: Usd.Prim, times: Array | None = None) -> World:
     """Return the transform above a skeleton, at each of ``times`` if something above moves.
@@ -38,19 +43,18 @@ def world_above(skeleton: Usd.Prim, times: Array | None = None) -> World:
     """
     stage = skeleton.GetStage()
     matrices = _matrices(skeleton, times)
-    u, singular, vt = np.linalg.svd(matrices[:, :3, :3])
-    if singular.min() < 1e-12:
+    scales = mean_scale(matrices[:, :3, :3])
+    if not scales.all():
         raise InputError(
             f"{stage.GetRootLayer().realPath}: {skeleton.GetPath()} stands under a zero scale."
         )
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
     axes = Y_UP_FROM_Z_UP if str(UsdGeom.GetStageUpAxis(stage)) == "Z" else np.eye(3)
     cm = 100.0 * UsdGeom.GetStageMetersPerUnit(stage)
     if not 0 < cm < np.inf:
         raise InputError(f"{stage.GetRootLayer().realPath}: metersPerUnit is {cm / 100.0:g}.")
     return World(
-        scale=float(np.exp(np.log(singular[0]).mean())) * cm,
-        rotation=axes @ u @ vt,
+        scale=float(scales[0]) * cm,
+        rotation=axes @ nearest_rotation(matrices[:, :3, :3]),
         translation=matrices[:, :3, 3] @ axes.T * cm,
         axes=axes,
     )
@@ -58,27 +62,7 @@ def world_above(skeleton: Usd.Prim, times: Array | None = None) -> World:
 
 def world_problems(skeleton: Usd.Prim, times: Array | None = None) -> tuple[Problem, ...]:
     """Return what a clip cannot represent of the transforms above a skeleton."""
-    linear = _matrices(skeleton, times)[:, :3, :3]
-    singular = np.linalg.svd(linear, compute_uv=False)
-    largest, smallest = singular.max(axis=1), singular.min(axis=1)
-    uneven = UNIFORM_SCALE_TOLERANCE * smallest
-    found = {
-        "zero-scale": ((smallest < 1e-12).any(), "a zero scale stands above the skeleton"),
-        "non-uniform-scale": (
-            (largest > smallest + uneven).any(),
-            "a non-uniform scale stands above the skeleton: bones are read with its mean",
-        ),
-        "mirrored": (
-            (np.linalg.det(linear) < 0).any(),
-            "a mirroring stands above the skeleton: sides may swap",
-        ),
-        "animated-scale": (
-            (np.abs(smallest - smallest[0]) > uneven[0]).any(),
-            "the scale above the skeleton changes over time: that of the first frame is read",
-        ),
-    }
-    where = str(skeleton.GetPath())
-    return tuple(Problem(code, text, where) for code, (there, text) in found.items() if there)
+    return scale_problems(_matrices(skeleton, times)[:, :3, :3], str(skeleton.GetPath()))
 
 
 def _matrices(prim: Usd.Prim, times: Array | None) -> Array:
