@@ -17,7 +17,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from usdhand.errors import HandNotFoundError, InputError, UsageError
-from usdhand.formats.bvh.file import frame_rate
 from usdhand.formats.bvh.numbers import RowError, compiled_rows, plain_rows
 from usdhand.formats.bvh.read import animation_names, read_character, read_clip
 from usdhand.motion import Clip, forward_kinematics
@@ -265,20 +264,6 @@ def test_the_pose_of_a_file_without_motion(tmp_path: Path) -> None:
     assert np.allclose(positions(still)[0], still.skeleton.bind_positions)
     with pytest.raises(InputError, match="no motion"):
         read_clip(path)
-
-
-@pytest.mark.parametrize(
-    ("time", "fps"),
-    [("0.016667", 60), ("0.01667", 60), ("0.0167", 60), ("0.017", 60), ("0.0166", 60),
-     ("0.0333", 30), (".03333", 30), ("0.033333", 30), ("0.033", 30), ("0.03", 30),
-     ("0.0333333351", 30), ("3.33333e-2", 30), ("0.008333", 120), ("0.0083", 120),
-     ("0.00833333", 120), ("0.041667", 24), ("0.0417", 24), ("0.04", 25), ("0.020000", 50),
-     ("0.010000", 100), ("0.1", 10), ("1", 1), ("0.03336667", 30000 / 1001),
-     ("0.0333667", 30000 / 1001), ("0.016683", 60000 / 1001), ("0.008342", 120000 / 1001),
-     ("0.0234567", 1 / 0.0234567), ("0.03125", 32)],
-)  # fmt: skip
-def test_frame_rates(time: str, fps: float) -> None:
-    assert frame_rate(time)[0] == pytest.approx(fps, rel=1e-7)
 
 
 # --- refused -------------------------------------------------------------------------------------

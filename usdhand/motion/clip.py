@@ -9,6 +9,7 @@ import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
+from usdhand.motion.timing import time_codes
 from usdhand.motion.transforms import decompose_trs
 from usdhand.problems import Problem
 
@@ -93,8 +94,12 @@ class Clip:
     @property
     def time_codes(self) -> Array:
         """(frames,) time codes in its file."""
-        o = self.origin
-        return np.asarray(o.first_time_code + np.arange(len(self)) * o.time_codes_per_frame, float)
+        return self.time_codes_of(np.arange(float(len(self))))
+
+    def time_codes_of(self, frames: Array) -> Array:
+        """Time codes (n,) of frame numbers (n,) in its file."""
+        origin = self.origin
+        return time_codes(frames, origin.first_time_code, origin.time_codes_per_frame)
 
     def with_rotations(self, rotations: Array) -> Clip:
         """Return the same clip with other joint rotations."""

@@ -9,6 +9,7 @@ import numpy as np
 from usdhand.errors import UsageError
 from usdhand.motion.clip import Clip
 from usdhand.motion.kinematics import forward_kinematics
+from usdhand.motion.timing import quotient, recounted_code
 
 FRAME_TOLERANCE = 1e-6  # of a frame
 LATEST_START = 1e9  # time codes; beyond, single frames are no longer told apart in a file
@@ -49,11 +50,17 @@ def trim(clip: Clip, first: float | None, last: float | None) -> Clip:
 
 def counted_in_frames(clip: Clip) -> Clip:
     """Return the clip with a time code a frame, as files have that are made anew."""
+    return recounted(clip, clip.fps)
+
+
+def recounted(clip: Clip, per_second: float) -> Clip:
+    """Return the clip at the same times, so many time codes being a second."""
+    old = clip.origin.time_codes_per_second
     origin = replace(
         clip.origin,
-        time_codes_per_second=clip.fps,
-        first_time_code=clip.start * clip.fps,
-        time_codes_per_frame=1.0,
+        time_codes_per_second=per_second,
+        first_time_code=recounted_code(clip.origin.first_time_code, old, per_second),
+        time_codes_per_frame=quotient(per_second, clip.fps),
     )
     return replace(clip, origin=origin)
 

@@ -10,6 +10,7 @@ import numpy as np
 from usdhand.errors import UsageError
 from usdhand.motion.clip import Clip
 from usdhand.motion.rotations import Array, slerp
+from usdhand.motion.timing import quotient, recounted_code
 
 BLOCK = 256
 
@@ -42,7 +43,7 @@ def resample(clip: Clip, fps: float) -> Clip:
         )
     count = int(np.floor(clip.duration * fps + 1e-6)) + 1
     frames = np.asarray(np.arange(count) * (clip.fps / fps), float)
-    origin = replace(clip.origin, time_codes_per_frame=clip.origin.time_codes_per_second / fps)
+    step = quotient(clip.origin.time_codes_per_second, fps)
     scales = clip.scales
     constant = scales.strides[0] == 0
     return replace(
@@ -53,7 +54,7 @@ def resample(clip: Clip, fps: float) -> Clip:
         if constant
         else interpolate(scales, frames),
         fps=float(fps),
-        origin=origin,
+        origin=replace(clip.origin, time_codes_per_frame=step),
     )
 
 
@@ -61,11 +62,13 @@ def in_time_of(body: Clip, other: Clip) -> Clip:
     """Return a body at the frames of another clip, from its first frame on, its ends held."""
     seconds = np.arange(len(other)) / other.fps
     frames = np.clip(seconds * body.fps, 0, len(body) - 1)
-    per_second = body.origin.time_codes_per_second
+    per_second, theirs = body.origin.time_codes_per_second, other.origin
     origin = replace(
         body.origin,
-        first_time_code=other.start * per_second,
-        time_codes_per_frame=per_second / other.fps,
+        first_time_code=recounted_code(
+            theirs.first_time_code, theirs.time_codes_per_second, per_second
+        ),
+        time_codes_per_frame=quotient(per_second, other.fps),
     )
     return replace(
         body,

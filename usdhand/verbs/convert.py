@@ -33,7 +33,14 @@ from usdhand.formats.usd.convert import StageEdit, placed, write_placed
 from usdhand.formats.usd.stage import find_character
 from usdhand.formats.usd.write import save_layer
 from usdhand.motion import Clip, Problem, resample
-from usdhand.motion.editing import counted_in_frames, in_place, scaled, starting_at, trim
+from usdhand.motion.editing import (
+    counted_in_frames,
+    in_place,
+    recounted,
+    scaled,
+    starting_at,
+    trim,
+)
 from usdhand.motion.resample import in_time_of
 from usdhand.report.convert import convert_result, summary
 from usdhand.requests.convert import ConvertRequest, Edits
@@ -107,9 +114,8 @@ def convert(
         return edit_frames(clip, edits, conventions)
 
     if usd_to_usd:
-        moved = motion(body)
-        placement = _placement(moved, edits, retimed=fingers is not None)
-        clip, edited = _on_stage(moved, placement), edits.of_frames or fingers is not None
+        clip, placement = _placed(motion(body), edits, retimed=fingers is not None)
+        edited = edits.of_frames or fingers is not None
         if not dry_run:
             character = placed(find_character(body_file, body_reading.skel), placement)
             lost += write_placed(character, clip, output, edited=edited, force=force, inputs=inputs)
@@ -192,26 +198,13 @@ def retarget_hands(hands: Clip, target: Clip, conventions: Conventions | None = 
     return own.decode(kept.replaced(taken.select(shared)), body)
 
 
-def _placement(clip: Clip, edits: Edits, retimed: bool) -> StageEdit:
-    """Return how a stage is placed anew so that ``clip`` starts where it shall."""
-    old = clip.origin.time_codes_per_second
+def _placed(clip: Clip, edits: Edits, retimed: bool) -> tuple[Clip, StageEdit]:
+    """Return a clip as its stage shows it when that is placed anew, and how that is done."""
     new = edits.fps or (clip.fps if retimed else None)
-    offset = 0.0
-    if edits.start is not None:
-        offset = starting_at(clip, edits.start).origin.first_time_code - clip.start * (new or old)
-    return StageEdit(new, offset, edits.scale, edits.up)
-
-
-def _on_stage(clip: Clip, placement: StageEdit) -> Clip:
-    """Return a clip as its stage shows it with another placement."""
-    per_second = placement.per_second or clip.origin.time_codes_per_second
-    origin = replace(
-        clip.origin,
-        time_codes_per_second=per_second,
-        first_time_code=clip.start * per_second + placement.offset,
-        time_codes_per_frame=per_second / clip.fps,
-    )
-    return scaled(replace(clip, origin=origin), placement.scale)
+    counted = recounted(clip, new or clip.origin.time_codes_per_second)
+    shown = counted if edits.start is None else starting_at(counted, edits.start)
+    offset = shown.origin.first_time_code - counted.origin.first_time_code
+    return scaled(shown, edits.scale), StageEdit(new, offset, edits.scale, edits.up)
 
 
 def _character(path: Path, reading: Reading) -> tuple[Clip, tuple[Problem, ...]]:

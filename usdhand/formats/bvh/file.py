@@ -14,6 +14,7 @@ from usdhand.formats.bvh.hierarchy import Hierarchy, line_at, parse_hierarchy
 from usdhand.formats.bvh.numbers import RowError, compiled_rows, plain_rows
 from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
+from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS, rate_of_frame_time
 
 # Bytes from which the compiled parser is used: loading it first takes a second.
 LARGE, LARGE_ONCE_LOADED = 40_000_000, 4_000_000
@@ -23,15 +24,6 @@ _MOTION = re.compile(rb"\bMOTION\b", re.IGNORECASE)
 
 _FRAMES = re.compile(rb"\s*frames\s*:?\s*(\S+)", re.IGNORECASE)
 _FRAME_TIME = re.compile(rb"\s*frame\s*time\s*:?\s*(\S+)[^\S\r\n]*(?:\r\n|\r|\n)?", re.IGNORECASE)
-
-# Rates that people mean, the more usual of two neighbours first.
-_USUAL_FPS = (
-    *(30.0, 60.0, 24.0, 25.0, 50.0, 120.0, 100.0, 240.0, 15.0, 12.0, 48.0, 90.0, 20.0, 10.0),
-    *(200.0, 250.0, 72.0, 75.0, 80.0, 96.0, 125.0, 144.0, 150.0, 180.0, 300.0, 360.0, 480.0),
-    *(500.0, 1000.0),
-    *(rate * 1000 / 1001 for rate in (30.0, 60.0, 24.0, 120.0)),
-)
-SLOWEST_FPS, FASTEST_FPS = 0.1, 10_000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +51,7 @@ def parse_file(path: Path) -> BvhFile:
                 data += file.read()
             hierarchy = parse_hierarchy(data, path)
             declared, time, start = _motion_header(data, hierarchy.motion, path)
-            fps, problems = frame_rate(time)
+            fps, problems = _frame_rate(time)
             size, shape = path.stat().st_size, (declared, hierarchy.width)
             rows = None
             # A number and what parts it from the next take two bytes.
@@ -126,26 +118,7 @@ def _shown(text: bytes) -> str:
     return text[:40].decode("latin-1")
 
 
-def frame_rate(time: str) -> tuple[float, tuple[Problem, ...]]:
-    """Frames a second of a frame time, as it is written: ``0.0333`` is 30, not 30.03.
-
-    The rate is that of the usual ones whose frame time, rounded or cut off to the digits written,
-    is this; whole ones are preferred to those of NTSC video, and near ones to far ones.
-    """
-    written = Decimal(time)
-    exponent = written.as_tuple().exponent
-    digit = 10.0**exponent if isinstance(exponent, int) else 0.0
-    seconds = float(written)
-    # The other tolerance is what a float32 leaves of a frame time.
-    within = min(max(digit, 2e-7 * seconds), 0.2 * seconds) * (1 + 1e-9)
-    if not any(abs(1.0 / fps - seconds) < 1e-9 * seconds for fps in _USUAL_FPS):
-        meant = [fps for fps in _USUAL_FPS if abs(1.0 / fps - seconds) < within]
-        whole = [fps for fps in meant if fps == int(fps)] or meant
-        if whole:
-            fps = min(whole, key=lambda fps: abs(1.0 / fps - seconds))
-            if abs(fps * seconds - 1.0) < 1e-6:  # rounding that nobody sees
-                return fps, ()
-            message = f"a frame time of {time} s is read as {fps:.5g} frames a second"
-            return fps, (Problem("guessed-fps", message, severity="note"),)
-        return 1.0 / seconds, ()
-    return min(_USUAL_FPS, key=lambda fps: abs(1.0 / fps - seconds)), ()
+def _frame_rate(time: str) -> tuple[float, tuple[Problem, ...]]:
+    fps, guessed = rate_of_frame_time(time)
+    message = f"a frame time of {time} s is read as {fps:.5g} frames a second"
+    return fps, (Problem("guessed-fps", message, severity="note"),) if guessed else ()

@@ -15,9 +15,8 @@ from usdhand.formats.fbx.skeletons import FbxSkeleton, find_skeleton, find_take,
 from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP
+from usdhand.motion.timing import DEFAULT_FPS
 from usdhand.motion.transforms import compose_trs
-
-DEFAULT_FPS = 30.0  # what FBX programs play a file at that does not say
 
 
 def read_clip(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from usdhand.errors import InputError
 from usdhand.motion.rotations import Array
+from usdhand.motion.timing import find_timing
 
 WORKER = Path(__file__).with_name("worker.py")
 TIME_LIMIT = 300.0  # seconds for one file
@@ -119,14 +120,14 @@ def load_scene(path: Path, animation: str | None = None, *, sample: bool = True)
         "path": str(path.resolve()),
         "sample": sample,
         "animation": animation,
+        "fps": None,
         "memory": MEMORY_LIMIT + 10 * path.stat().st_size,
     }
-    output = _run(request, path)
-    header, _, numbers = output.partition(b"\n")
-    said = json.loads(header)
-    if "error" in said:
-        raise InputError(f"{path}: cannot be read as FBX ({said['error']}).")
-    return _scene(path, said, np.frombuffer(numbers))
+    said, numbers = _ask(request, path)
+    if "keys" in said:
+        request["fps"] = find_timing([np.array(said["keys"])]).fps
+        said, numbers = _ask(request, path)
+    return _scene(path, said, numbers)
 
 
 def library_folder(path: Path) -> Path:
@@ -143,6 +144,15 @@ def library_folder(path: Path) -> Path:
             "pip uninstall pyufbx, then pip install --force-reinstall 'usdhand[convert]'"
         )
     return folder.parent
+
+
+def _ask(request: dict[str, Any], path: Path) -> tuple[dict[str, Any], Array]:
+    """What the worker says of a file, and the numbers of what it sampled."""
+    header, _, numbers = _run(request, path).partition(b"\n")
+    said: dict[str, Any] = json.loads(header)
+    if "error" in said:
+        raise InputError(f"{path}: cannot be read as FBX ({said['error']}).")
+    return said, np.frombuffer(numbers)
 
 
 def _run(request: dict[str, Any], path: Path) -> bytes:

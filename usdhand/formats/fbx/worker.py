@@ -1,7 +1,7 @@
 """What the ufbx library says of one FBX file, as JSON and numbers on standard output.
 
 usage: python -I -S worker.py '{"library": FOLDER_OF_UFBX, "path": FILE.fbx, "sample": true,
-    "animation": NAME or null, "memory": BYTES}'
+    "animation": NAME or null, "fps": what a file does not say or null, "memory": BYTES}'
 
 Runs in a process of its own, because a damaged file can crash a C library, and because the
 bindings (0.0.5) count references wrongly: an element that is asked for twice is freed while it is
@@ -36,7 +36,10 @@ def held(items: Iterable[Any]) -> list[Any]:
 
 
 def main(request: dict[str, Any]) -> None:
-    """Describe a file; sample the chosen animation, or the only one that has keys."""
+    """Describe a file; sample the chosen animation, or the only one that has keys.
+
+    Without a frame rate it is not sampled: the key times of its longest curve are told instead.
+    """
     _limit(request["memory"])
     sys.path.append(request["library"])
     ufbx: Any = importlib.import_module("ufbx")
@@ -48,6 +51,7 @@ def main(request: dict[str, Any]) -> None:
         return _answer({"error": str(error)})
     nodes, stacks = held(scene.nodes), held(scene.anim_stacks)
     header = _header(scene, nodes, stacks)
+    keys = [stack.pop("keys") for stack in header["stacks"]]
     name = request["animation"]
     keyed = [i for i, stack in enumerate(header["stacks"]) if stack["moved"]]
     wanted = [i for i in keyed if name is None or name == header["stacks"][i]["name"]]
@@ -55,7 +59,9 @@ def main(request: dict[str, Any]) -> None:
         return _answer(header)
     [chosen] = wanted
     stack = header["stacks"][chosen]
-    fps = header["fps"] or _rate(stack["spacing"])
+    fps = header["fps"] or request["fps"]
+    if fps is None:
+        return _answer(header | {"keys": keys[chosen]})
     first, count, by_keys = _frames(stack, fps)
     if not 0 < count <= MAX_FRAMES:
         return _answer({"error": f"the keys span {count} frames; at most {MAX_FRAMES} are read"})
@@ -131,9 +137,14 @@ def _node(node: Any, index: dict[int, int]) -> dict[str, Any]:
 
 
 def _stack(stack: Any, index: dict[int, int]) -> dict[str, Any]:
-    """Nodes that have keys, and when: of the curves on anything but their visibility."""
+    """Nodes that have keys, and when: of the curves on anything but their visibility.
+
+    A curve of one key is constant: it tells the span only where there are no others.
+    """
     moved: set[int] = set()
-    first, last, longest = float("inf"), -float("inf"), None
+    spans: list[tuple[float, float]] = []
+    still: list[tuple[float, float]] = []
+    longest = None
     for layer in held(stack.layers):
         for prop in held(layer.anim_props):
             node = index.get(prop.element.element_id)
@@ -143,30 +154,23 @@ def _stack(stack: Any, index: dict[int, int]) -> dict[str, Any]:
                 if curve is None or not len(curve.keyframes):
                     continue
                 moved.add(node)
-                first, last = min(first, curve.min_time), max(last, curve.max_time)
+                several = len(curve.keyframes) > 1
+                (spans if several else still).append((curve.min_time, curve.max_time))
                 if longest is None or len(curve.keyframes) > len(longest.keyframes):
                     longest = curve
+    spans = spans or still[:1] or [(float("inf"), -float("inf"))]
+    keys = [] if longest is None else [key.time for key in held(longest.keyframes)]
+    steps = [b - a for a, b in pairwise(keys)]
     return {
         "name": stack.name,
         "begin": stack.time_begin,
         "end": stack.time_end,
-        "first": first,
-        "last": last,
-        "spacing": _spacing(longest),
+        "first": min(first for first, _ in spans),
+        "last": max(last for _, last in spans),
+        "keys": keys,
+        "spacing": median(steps) if steps else 0.0,  # usual distance of two keys, seconds
         "moved": sorted(moved),
     }
-
-
-def _spacing(curve: Any) -> float:
-    """Usual distance of two keys, seconds; 0 if there are no two."""
-    times = [] if curve is None else [key.time for key in held(curve.keyframes)]
-    steps = [b - a for a, b in pairwise(times)]
-    return median(steps) if steps else 0.0
-
-
-def _rate(spacing: float) -> float:
-    """Frames a second that keys at this distance mean."""
-    return round(1.0 / spacing, 3) if spacing > 1e-4 else 30.0
 
 
 def _frames(stack: dict[str, Any], fps: float) -> tuple[float, int, bool]:

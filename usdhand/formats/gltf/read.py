@@ -15,10 +15,10 @@ from usdhand.formats.gltf.document import Document, read_document, unused
 from usdhand.formats.gltf.nodes import Tree, read_tree
 from usdhand.formats.gltf.placement import Motion, Space, find_placement, placed, sampled
 from usdhand.formats.gltf.poses import bind_matrices
-from usdhand.formats.gltf.timing import DEFAULT_FPS, Timing, find_timing
 from usdhand.formats.gltf.vrm import Humanoid, read_humanoid
 from usdhand.motion import Clip, Origin, Problem, Skeleton
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP
+from usdhand.motion.timing import DEFAULT_FPS, MOST_FRAMES, Timing, find_timing
 from usdhand.motion.transforms import compose_trs
 
 CM_PER_UNIT = 100.0
@@ -123,7 +123,12 @@ def _animated(scene: _Scene, animation: str | None, cm: float | None, up: str | 
             f"{document.path}: the animation '{name}' moves none of the {len(nodes)} joints of "
             f"'{scene.character.names[0]}'."
         )
-    timing = find_timing(str(document.path), [curve.times for curve in curves.values()])
+    timing = find_timing([curve.times for curve in curves.values()])
+    if timing.count > MOST_FRAMES:
+        raise InputError(
+            f"{document.path}: its keys from {timing.start:g} to {timing.keys[-1]:g} s would make "
+            f"more than {MOST_FRAMES} frames. Check the key times."
+        )
     if timing.count * len(nodes) > MOST_VALUES:
         raise InputError(
             f"{document.path}: {timing.count} frames of {len(nodes)} joints cannot be meant. "
@@ -140,7 +145,8 @@ def _animated(scene: _Scene, animation: str | None, cm: float | None, up: str | 
         first_time_code=_first_frame(timing),
     )
     skeleton, missing = _skeleton(scene, cm, up)
-    guess = (Problem("guessed-fps", timing.guess, name, "note"),) if timing.guess else ()
+    guess = _guess(timing)
+    guessed = (Problem("guessed-fps", guess, name, "note"),) if guess else ()
     return Clip(
         skeleton,
         rotations,
@@ -149,7 +155,7 @@ def _animated(scene: _Scene, animation: str | None, cm: float | None, up: str | 
         timing.fps,
         document.path.stem,
         origin,
-        tuple(dict.fromkeys((*problems, *found, *missing, *guess))),
+        tuple(dict.fromkeys((*problems, *found, *missing, *guessed))),
     )
 
 
@@ -211,3 +217,15 @@ def _origin(scene: _Scene, cm: float | None, up: str | None) -> Origin:
 def _first_frame(timing: Timing) -> float:
     frame = timing.start * timing.fps
     return float(round(frame)) if abs(frame - round(frame)) < 1e-2 else frame
+
+
+def _guess(timing: Timing) -> str:
+    """What to tell people about the frame rate, "" where nothing was guessed."""
+    fps = f"{timing.fps:g} frames a second"
+    return {
+        "steady": "",
+        "one key": f"one key tells no frame rate: {fps} are assumed",
+        "rounded": f"key times are rounded: read as {fps}",
+        "sparse": f"keys are sparse: read at {fps}, on which all of them lie",
+        "uneven": f"{len(timing.keys)} key times lie on no steady frame rate: resampled at {fps}",
+    }[timing.rhythm]

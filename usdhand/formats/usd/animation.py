@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, UsdSkel, Vt
 
-from usdhand.formats.usd.curves import Tracks, frame_times, joint_targets
+from usdhand.formats.usd.curves import Tracks, frame_timing, joint_targets
 from usdhand.formats.usd.samples import EVERY, Places, Track, blocks, steady
 from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import world_above
@@ -143,7 +143,7 @@ def _kept(character: Character, clip: Clip, changed: Sequence[int]) -> Kept | No
     animation = UsdSkel.Animation(character.animation)
     targets = joint_targets(animation, clip.skeleton.joints)
     tracks = Tracks.of(animation, len(targets))
-    times, _ = frame_times(character.stage, tracks.times)
+    times = frame_timing(character.stage, tracks.times)[0].times
     if len(times) != len(clip) or not np.allclose(times, clip.time_codes, rtol=1e-12, atol=1e-6):
         return None
     every = np.arange(len(clip.skeleton))

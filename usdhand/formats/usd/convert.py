@@ -29,6 +29,7 @@ from usdhand.formats.usd.write import (
 )
 from usdhand.motion import Clip, Problem
 from usdhand.motion.rotations import Array
+from usdhand.motion.timing import recounted_code
 from usdhand.motion.transforms import local_matrices
 
 # Problems of a clip whose animation is written again to mend them.
@@ -69,7 +70,7 @@ def placed(character: Character, placement: StageEdit) -> Character:
         layer.timeCodesPerSecond = layer.framesPerSecond = new
     for field in ("startTimeCode", "endTimeCode"):
         if source.HasAuthoredMetadata(field):
-            moved = source.GetMetadata(field) * (new or old) / old + placement.offset
+            moved = recounted_code(source.GetMetadata(field), old, new or old) + placement.offset
             layer.pseudoRoot.SetInfo(field, moved)
     stage = Usd.Stage.Open(layer)
     _turn_and_scale(stage, placement)

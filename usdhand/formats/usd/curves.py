@@ -13,14 +13,12 @@ from usdhand.errors import InputError
 from usdhand.formats.usd.samples import EVERY, Track, blocks, open_track
 from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
+from usdhand.motion.timing import MOST_FRAMES, Clock, Timing, find_timing
 
 UNIT_TOLERANCE = 1e-6  # of a squared norm: what rounding to float32 leaves
 SHORTEST = 1e-6  # squared norm below which a quaternion has no direction
-STEADY_TOLERANCE = 1e-3  # frames: how far samples may lie off a steady grid
-SLOWEST_NATIVE_FPS = 12.0  # sparser samples are keys of curves, not frames
 FASTEST_TIME_CODES = 240.0  # above, time codes are ticks rather than frames
-
-MOST_FRAMES = 1_000_000  # more is a mistake in time codes: 4.6 hours at 60 fps
+USUAL_FPS = 24.0  # of a stage that counts ticks and does not say its frame rate
 
 Fault = tuple[NDArray[np.bool_], str]  # (samples, joints) that cannot be used, and what they are
 Finish = Callable[[Array, slice], Fault | None]
@@ -55,7 +53,7 @@ class Tracks:
     def times(self) -> list[Array]:
         """Sample times of those that have any."""
         tracks = (self.rotations, self.translations, self.scales)
-        return [track.times for track in tracks if track is not None and not track.still]
+        return [track.times for track in tracks if track is not None and len(track.times)]
 
 
 def read_curve(
@@ -133,64 +131,41 @@ def finish_vectors(factor: float) -> Finish:
     return finish
 
 
-def frame_times(stage: Usd.Stage, samples: list[Array]) -> tuple[Array, tuple[Problem, ...]]:
-    """Time codes of a clip's frames: those of its samples where steady, else a steady grid.
+def frame_timing(stage: Usd.Stage, samples: list[Array]) -> tuple[Timing, tuple[Problem, ...]]:
+    """Find a clip's frames: its samples where they are steady, else a steady grid over them.
 
     Raises
     ------
     InputError
         if the time codes cannot be meant.
     """
-    times = _union(samples)
-    per_second = stage.GetTimeCodesPerSecond()
-    if not np.isfinite(times).all() or not 0 < per_second < np.inf:
+    where = stage.GetRootLayer().realPath
+    samples = samples or [np.array([stage.GetStartTimeCode()])]
+    per_second, said = stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()
+    if not all(np.isfinite(times).all() for times in samples) or not 0 < per_second < np.inf:
         raise InputError(
-            f"{stage.GetRootLayer().realPath}: its time codes are no times, at {per_second:g} time "
-            "codes a second. Export the animation again."
+            f"{where}: its time codes are no times, at {per_second:g} time codes a second. Export "
+            "the animation again."
         )
-    if not len(times):
-        return np.array([stage.GetStartTimeCode()]), ()
-    if len(times) == 1:
-        return times, ()
-    step = (times[-1] - times[0]) / (len(times) - 1)
-    steady = np.abs(np.diff(times) - step).max() < STEADY_TOLERANCE * step
-    if steady and per_second / step >= SLOWEST_NATIVE_FPS:
-        return times, ()
-    frame = _frame(times, per_second, stage.GetFramesPerSecond())
-    count = int(np.floor((times[-1] - times[0]) / frame + 1e-6)) + 1
-    if count > MOST_FRAMES:
+    if per_second <= FASTEST_TIME_CODES:
+        rate = per_second
+    else:
+        rate = said if 0 < said < np.inf else USUAL_FPS
+    timing = find_timing(samples, Clock(per_second, rate))
+    if timing.rhythm != "uneven":
+        return timing, ()
+    count, first, last = len(timing.keys), timing.keys[0], timing.keys[-1]
+    if timing.count > MOST_FRAMES:
         raise InputError(
-            f"{stage.GetRootLayer().realPath}: its {len(times)} samples are spread over time codes "
-            f"{times[0]:g} to {times[-1]:g}, which would make {count} frames. Check the time codes "
-            "or timeCodesPerSecond."
+            f"{where}: its {count} samples are spread over time codes {first:g} to {last:g}, which "
+            f"would make {timing.count} frames. Check the time codes or timeCodesPerSecond."
         )
     problem = Problem(
         "resampled",
-        f"{len(times)} samples are not a steady sequence of frames: read every {frame:g} time "
+        f"{count} samples are not a steady sequence of frames: read every {timing.step:g} time "
         "codes, interpolated as USD does",
     )
-    return np.asarray(times[0] + frame * np.arange(count)), (problem,)
-
-
-def _frame(times: Array, per_second: float, fps: float) -> float:
-    """Time codes a frame of a steady grid over unsteady samples."""
-    ticks = per_second > FASTEST_TIME_CODES
-    frame = per_second / (fps if 0 < fps < np.inf else 24.0) if ticks else 1.0
-    shortest = float(np.diff(times).min())
-    on_grid = (times - times[0]) / shortest
-    if np.abs(on_grid - np.round(on_grid)).max() < STEADY_TOLERANCE and (
-        frame / 20 <= shortest < frame
-    ):
-        return shortest
-    return frame
-
-
-def _union(samples: list[Array]) -> Array:
-    if not samples:
-        return np.empty(0)
-    if all(np.array_equal(samples[0], other) for other in samples[1:]):
-        return samples[0]
-    return np.unique(np.concatenate(samples).round(9))
+    return timing, (problem,)
 
 
 def joint_targets(animation: UsdSkel.Animation, joints: Sequence[str]) -> NDArray[np.intp]:

@@ -16,7 +16,7 @@ from usdhand.formats.usd.curves import (
     Tracks,
     finish_rotations,
     finish_vectors,
-    frame_times,
+    frame_timing,
     joint_targets,
     read_curve,
 )
@@ -28,10 +28,8 @@ from usdhand.formats.usd.world import World, world_above, world_problems
 from usdhand.motion import Clip, Origin, Problem, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS
 from usdhand.motion.transforms import compose_trs, with_even_signs
-
-# Rates that a file may mean; beyond, its time codes are something else.
-SLOWEST_FPS, FASTEST_FPS = 0.1, 10_000.0
 
 
 def read_clip(path: str | Path, skel: str | None = None) -> Clip:
@@ -88,7 +86,8 @@ def _animated_clip(character: Character) -> Clip:
     parents = parents_from_paths(joints)
     targets = _targets(character, animation, joints)
     tracks = Tracks.of(animation, len(targets))
-    times, resampled = frame_times(character.stage, tracks.times)
+    timing, resampled = frame_timing(character.stage, tracks.times)
+    times = timing.times
     world = world_above(character.skeleton, times)
     poses, missing = authored_poses(character, len(joints), world.scale)
     rotations, translations, scales = _curves(
@@ -98,11 +97,10 @@ def _animated_clip(character: Character) -> Clip:
     q, t = _place(rotations, translations, parents, world)
     skeleton, repaired = placed_skeleton(joints, parents, poses, world, compose_trs(t[0], q[0]))
     skeleton = with_names(skeleton, character.skeleton)
-    step = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
     origin = replace(
         _origin(character, world),
-        first_time_code=float(times[0]),
-        time_codes_per_frame=step,
+        first_time_code=timing.start,
+        time_codes_per_frame=timing.step,
         animation_path=str(animation.GetPath()),
     )
     problems = (
@@ -114,13 +112,12 @@ def _animated_clip(character: Character) -> Clip:
         *resampled,
         *repaired,
     )
-    fps = origin.time_codes_per_second / step
-    if not SLOWEST_FPS <= fps <= FASTEST_FPS:
+    if not SLOWEST_FPS <= timing.fps <= FASTEST_FPS:
         raise InputError(
-            f"{character.path}: {fps:g} frames a second cannot be meant; check timeCodesPerSecond "
-            f"({origin.time_codes_per_second:g})."
+            f"{character.path}: {timing.fps:g} frames a second cannot be meant; check "
+            f"timeCodesPerSecond ({origin.time_codes_per_second:g})."
         )
-    return Clip(skeleton, q, t, scales, fps, character.path.stem, origin, problems)
+    return Clip(skeleton, q, t, scales, timing.fps, character.path.stem, origin, problems)
 
 
 def _still_clip(character: Character) -> Clip:

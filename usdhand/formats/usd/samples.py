@@ -26,7 +26,7 @@ Places = NDArray[np.intp] | slice
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """An array attribute at some time codes: a row each, or one row if it has a value only.
+    """An array attribute at some time codes: a row each, or one row if it has one value only.
 
     Attributes
     ----------
@@ -43,8 +43,8 @@ class Track:
 
     @property
     def still(self) -> bool:
-        """Whether there is one value and no time samples."""
-        return not len(self.times)
+        """Whether there is one value for all times, be it a time sample."""
+        return len(self.keys) == 1
 
     def at(self, times: Array) -> Track:
         """The same attribute at other times, as USD interpolates it."""
