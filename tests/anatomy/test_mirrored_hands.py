@@ -10,7 +10,7 @@ from builders.mirroring import mirror_below
 from conftest import REPOSITORY
 from numpy.testing import assert_allclose
 
-from usdhand import verbs as api
+import usdhand
 from usdhand.anatomy.channels import Channels
 from usdhand.motion import forward_kinematics
 
@@ -30,10 +30,10 @@ ADA = REPOSITORY / "samples" / "gestures" / "ok_01.usdc"
 def test_the_same_angles_and_the_same_pose(
     tmp_path: Path, top: str, signs: tuple[int, ...]
 ) -> None:
-    plain = api.read_clip(ADA)
-    mirrored = api.read_clip(mirror_below(ADA, tmp_path / "mirrored.usdc", top, signs))
+    plain = usdhand.read_clip(ADA)
+    mirrored = usdhand.read_clip(mirror_below(ADA, tmp_path / "mirrored.usdc", top, signs))
     assert (mirrored.scales < 0).any() == (np.prod(signs) < 0)
-    hands, theirs = api.find_hands(plain), api.find_hands(mirrored)
+    hands, theirs = usdhand.find_hands(plain), usdhand.find_hands(mirrored)
     channels = hands.encode(plain)
     assert_allclose(theirs.encode(mirrored).values, channels.values, atol=2e-3)
     wave = 20.0 * np.sin(np.arange(channels.values.size)).reshape(channels.values.shape)

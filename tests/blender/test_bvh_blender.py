@@ -14,6 +14,7 @@ from conftest import REPOSITORY, shared_data
 import usdhand
 from usdhand.formats.bvh.read import read_clip
 from usdhand.formats.bvh.write import write_clip
+from usdhand.formats.reading import Reading
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 
@@ -81,7 +82,7 @@ def test_real_takes_agree(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", REAL_BVH)
 def test_real_files_are_read_as_blender_does(tmp_path: Path, name: str) -> None:
     path = shared_data("bvh", *f"{name}.bvh".split("/"))
-    clip = read_clip(path, up="Y")
+    clip = read_clip(path, Reading(up="Y"))
     cm = clip.origin.cm_per_unit
     # Blender's rest pose is the one of all channels zero, which need not be our bind pose.
     eye = np.tile(np.eye(4), (len(clip.skeleton), 1, 1))

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from usdhand.errors import HandNotFoundError, InputError, UsageError
 from usdhand.formats.bvh.numbers import RowError, compiled_rows, plain_rows
 from usdhand.formats.bvh.read import animation_names, read_character, read_clip
+from usdhand.formats.reading import Reading
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.rigs import map_character
@@ -42,7 +43,7 @@ def positions(clip: Clip) -> np.ndarray:
 
 
 def as_is(path: Path) -> Clip:
-    return read_clip(path, up="Y", cm_per_unit=1.0)
+    return read_clip(path, Reading(up="Y", cm_per_unit=1.0))
 
 
 def codes(clip: Clip) -> set[str]:
@@ -225,18 +226,18 @@ def test_several_roots(tmp_path: Path) -> None:
     rows = ["0 91 0 10 20 30 40 50 60 1 2 3", "1 92 0 11 21 31 41 51 61 4 5 6",
             "2 93 0 12 22 32 42 52 62 7 8 9"]  # fmt: skip
     path = edited(tmp_path, *changes, *((row, f"{row} {row[:-1]}1") for row in rows))
-    both, prop = as_is(path), read_clip(path, skel="Prop", up="Y", cm_per_unit=1.0)
+    both, prop = as_is(path), read_clip(path, Reading(skel="Prop", up="Y", cm_per_unit=1.0))
     assert list(np.flatnonzero(both.skeleton.parents < 0)) == [0, 4]
     assert np.allclose(positions(both), plain_positions(path, [0, 1, 2]))
     assert prop.skeleton.joints[:2] == ("Prop", "Prop/Arm")
     assert np.allclose(positions(prop), positions(both)[:, 4:])
     with pytest.raises(UsageError, match="no ROOT 'Hat'; it has Hips, Prop"):
-        read_clip(path, skel="Hat")
+        read_clip(path, Reading(skel="Hat"))
 
 
 def test_units_and_axes_as_told(tmp_path: Path) -> None:
     path = written(tmp_path, ARM)
-    told = read_clip(path, cm_per_unit=2.5, up="Z")
+    told = read_clip(path, Reading(cm_per_unit=2.5, up="Z"))
     plain = plain_positions(path, [0, 1, 2]) * 2.5
     turned = np.stack([plain[..., 0], plain[..., 2], -plain[..., 1]], axis=-1)
     assert np.allclose(positions(told), turned)
@@ -259,7 +260,7 @@ def test_positions_that_seem_to_be_added_are_said(tmp_path: Path) -> None:
 
 def test_the_pose_of_a_file_without_motion(tmp_path: Path) -> None:
     path = written(tmp_path, ARM[: ARM.index("Frames")] + "Frames: 0\nFrame Time: 0.02\n")
-    still = read_character(path, cm_per_unit=1.0)
+    still = read_character(path, Reading(cm_per_unit=1.0))
     assert len(still) == 1
     assert np.allclose(positions(still)[0], still.skeleton.bind_positions)
     with pytest.raises(InputError, match="no motion"):
@@ -326,7 +327,7 @@ def test_missing_and_empty_files(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="line 1: this is no BVH file"):
         read_clip(written(tmp_path, b""))
     with pytest.raises(UsageError, match="one animation, 'take'"):
-        read_clip(written(tmp_path, ARM), animation="walk")
+        read_clip(written(tmp_path, ARM), Reading(animation="walk"))
 
 
 def test_nothing_is_nested_too_deep_or_too_much(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from usdhand.formats.bvh.euler import zxy_angles
 from usdhand.formats.bvh.motion import from_euler
 from usdhand.formats.bvh.read import read_character, read_clip
 from usdhand.formats.bvh.write import write_clip
+from usdhand.formats.reading import Reading
 from usdhand.motion import Clip, Problem, Skeleton, forward_kinematics, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.rigs import map_character
@@ -65,7 +66,7 @@ def assert_same(clip: Clip, other: Clip) -> None:
 def there_and_back(clip: Clip, folder: Path, **told: object) -> tuple[Clip, tuple[Problem, ...]]:
     """Write and read; units and axes are guessed unless told."""
     problems = write_clip(clip, folder / "out.bvh", up=str(told.get("up", "Y")))
-    return read_clip(folder / "out.bvh", **told), problems  # type: ignore[arg-type]
+    return read_clip(folder / "out.bvh", Reading(**told)), problems  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("up", ["Y", "Z"])
@@ -170,7 +171,7 @@ def test_any_skeleton_comes_back(
 
 
 def arm(folder: Path) -> Clip:
-    return read_clip(written(folder, ARM), up="Y", cm_per_unit=1.0)
+    return read_clip(written(folder, ARM), Reading(up="Y", cm_per_unit=1.0))
 
 
 def test_zero_is_the_bind_pose(tmp_path: Path) -> None:
@@ -182,7 +183,7 @@ def test_zero_is_the_bind_pose(tmp_path: Path) -> None:
     hips = " ".join(f"{v:.6f}" for v in clip.skeleton.bind_positions[0])
     zero = f"{hips} {zero[6:]}"
     path = written(tmp_path, text.replace("\n".join(rows), zero).replace(f": {len(clip)}", ": 1"))
-    still = read_character(path, up="Y", cm_per_unit=1.0)
+    still = read_character(path, Reading(up="Y", cm_per_unit=1.0))
     theirs = matched(clip, still)
     assert np.abs(still.skeleton.bind_positions[theirs] - clip.skeleton.bind_positions).max() < 1e-4
     assert np.allclose(still.skeleton.bind_rotations, np.eye(3))
@@ -234,7 +235,7 @@ def test_names_are_those_of_the_file_each_once(tmp_path: Path) -> None:
 def test_a_plain_reader_reads_what_we_write(tmp_path: Path) -> None:
     clip = usdhand.read_clip(REPOSITORY / "samples" / "gestures" / "big_03.usdc")
     write_clip(clip, tmp_path / "out.bvh")
-    back = read_clip(tmp_path / "out.bvh", up="Y", cm_per_unit=1.0)
+    back = read_clip(tmp_path / "out.bvh", Reading(up="Y", cm_per_unit=1.0))
     frames = [0, len(clip) // 2, len(clip) - 1]
     plain = plain_positions(tmp_path / "out.bvh", frames)
     ours = forward_kinematics(clip).positions[frames]

@@ -19,6 +19,7 @@ from builders.fbx_files import (
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.fbx import read, scene
+from usdhand.formats.reading import Reading
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 
@@ -128,7 +129,7 @@ def test_animated_and_zero_scale(tmp_path: Path) -> None:
 )
 def test_units(tmp_path: Path, unit: float, given: float | None, cm: float) -> None:
     path = write_fbx(tmp_path / "a.fbx", chain(), settings={"UnitScaleFactor": unit})
-    clip = read.read_clip(path, cm_per_unit=given)
+    clip = read.read_clip(path, Reading(cm_per_unit=given))
     assert np.allclose(world(clip)[0, :, 1], [10 * cm, 20 * cm, 30 * cm])
     assert np.allclose(clip.skeleton.bind_positions, world(clip)[0])
     assert clip.origin.cm_per_unit == pytest.approx(cm)
@@ -143,8 +144,10 @@ def test_up_axis(tmp_path: Path) -> None:
     assert np.allclose(world(said), expected)
     unsaid = write_fbx(tmp_path / "b.fbx", nodes)
     assert read.read_clip(unsaid).origin.up_axis == "Y"
-    assert np.allclose(world(read.read_clip(unsaid, up="Z")), expected)
-    assert np.allclose(world(read.read_clip(tmp_path / "a.fbx", up="Y")) @ Y_UP.T, expected)
+    assert np.allclose(world(read.read_clip(unsaid, Reading(up="Z"))), expected)
+    assert np.allclose(
+        world(read.read_clip(tmp_path / "a.fbx", Reading(up="Y"))) @ Y_UP.T, expected
+    )
 
 
 def test_left_handed_axes(tmp_path: Path) -> None:
@@ -219,8 +222,8 @@ def test_takes(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"'Walk', 'Wave'.*--animation"):
         read.read_clip(path)
     with pytest.raises(UsageError, match="no animation 'Empty'"):
-        read.read_clip(path, animation="Empty")
-    wave = read.read_clip(path, animation="Wave")
+        read.read_clip(path, Reading(animation="Empty"))
+    wave = read.read_clip(path, Reading(animation="Wave"))
     assert wave.origin.animation_path == "Wave"
     assert wave.origin.first_time_code == 30.0
     assert np.allclose(rot.angle_between(wave.rotations[0], wave.rotations[-1]), 45.0)
@@ -290,15 +293,15 @@ def test_several_skeletons(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"'A', 'B'.*--skel"):
         read.read_clip(path)
     with pytest.raises(UsageError, match="no skeleton 'C'"):
-        read.read_clip(path, skel="C")
+        read.read_clip(path, Reading(skel="C"))
     for name in ("B", "Hips1"):
-        clip = read.read_clip(path, skel=name)
+        clip = read.read_clip(path, Reading(skel=name))
         assert clip.skeleton.joints[0] == "Hips1"
         assert clip.origin.skeleton_path == "B"
     moving = write_fbx(tmp_path / "b.fbx", [*one, both[4], *still])
     assert read.read_clip(moving).origin.skeleton_path == "A"
     with pytest.raises(InputError, match="does not move 'B'"):
-        read.read_clip(moving, skel="B")
+        read.read_clip(moving, Reading(skel="B"))
     prop = [*chain(), Node("Sword", keys=SWING)]
     assert read.read_clip(write_fbx(tmp_path / "c.fbx", prop)).origin.skeleton_path == "Hips"
 
@@ -351,7 +354,7 @@ def test_missing_files_and_skeletons(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no skeleton"):
         read.read_clip(write_fbx(tmp_path / "b.fbx", [light]))
     with pytest.raises(InputError, match="one unit is 0 cm"):
-        read.read_clip(write_fbx(tmp_path / "c.fbx", chain()), cm_per_unit=0.0)
+        read.read_clip(write_fbx(tmp_path / "c.fbx", chain()), Reading(cm_per_unit=0.0))
 
 
 def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,6 +20,7 @@ from test_gltf_vrm import vrm1
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.gltf.read import animation_names, read_character, read_clip
+from usdhand.formats.reading import Reading
 from usdhand.motion import Clip, forward_kinematics
 
 TIMES = np.arange(6) / 30.0
@@ -225,7 +226,7 @@ def test_many_of_one_name(tmp_path: Path) -> None:
     path = file.write(tmp_path / "take.glb")
     began = time.process_time()
     assert animation_names(path)[-1] == "same_600"
-    clip = read_clip(path, animation="same_7")
+    clip = read_clip(path, Reading(animation="same_7"))
     assert len(set(clip.skeleton.joints)) == 600
     assert time.process_time() - began < SECONDS
 
@@ -368,7 +369,7 @@ def survives(path: Path) -> bool:
 
 def first_of_all(path: Path) -> Clip:
     """The first animation, whatever its name is."""
-    return read_clip(path, animation=next(iter(animation_names(path)), None))
+    return read_clip(path, Reading(animation=next(iter(animation_names(path)), None)))
 
 
 def fuzz(count: int, seed: int, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from oracles.gltf import Oracle
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.gltf.read import animation_names, read_character, read_clip
+from usdhand.formats.reading import Reading
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 
@@ -40,7 +41,7 @@ def assert_agrees(
 
 
 def read(file: GltfFile, tmp_path: Path, suffix: str = ".glb", **options: Any) -> Clip:
-    return read_clip(file.write(tmp_path / f"take{suffix}"), **options)
+    return read_clip(file.write(tmp_path / f"take{suffix}"), Reading(**options))
 
 
 # -- real files ---------------------------------------------------------------------------------
@@ -272,17 +273,17 @@ def test_several_of_everything(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="2 skeletons"):
         read_character(path)
     with pytest.raises(UsageError, match="no skeleton 'Cy', only 'Ann', 'Bob'"):
-        read_clip(path, skel="Cy")
+        read_clip(path, Reading(skel="Cy"))
     with pytest.raises(UsageError, match=r"2 animations: 'walk', 'walk_2'.*--animation NAME"):
-        read_clip(path, skel="Ann")
+        read_clip(path, Reading(skel="Ann"))
     with pytest.raises(UsageError, match="no animation 'run'"):
-        read_clip(path, skel="Ann", animation="run")
+        read_clip(path, Reading(skel="Ann", animation="run"))
     with pytest.raises(InputError, match="'walk' moves none of the 6 joints of 'Bob'"):
-        read_clip(path, skel="Bob", animation="walk")
-    clip = read_clip(path, skel="Bob", animation="walk_2")
+        read_clip(path, Reading(skel="Bob", animation="walk"))
+    clip = read_clip(path, Reading(skel="Bob", animation="walk_2"))
     origin = clip.origin
     assert (origin.skeleton_path, origin.animation_path) == ("Bob", "walk_2")
-    again = read_clip(path, skel=origin.skeleton_path, animation=origin.animation_path)
+    again = read_clip(path, Reading(skel=origin.skeleton_path, animation=origin.animation_path))
     assert (again.rotations == clip.rotations).all()
 
 
@@ -290,7 +291,7 @@ def test_twins_can_be_chosen(tmp_path: Path) -> None:
     path = two_people(("Rig", "Rig")).write(tmp_path / "take.glb")
     with pytest.raises(UsageError, match="2 skeletons: 'skeleton_0', 'skeleton_1'"):
         read_character(path)
-    assert len(read_character(path, skel="skeleton_1").skeleton) == 6
+    assert len(read_character(path, Reading(skel="skeleton_1")).skeleton) == 6
 
 
 def test_skins_of_one_character(tmp_path: Path) -> None:
@@ -349,7 +350,7 @@ def test_units_and_axes_by_hand(tmp_path: Path) -> None:
     turned = plain[..., [0, 2, 1]] * [0.01, 0.01, -0.01]
     assert forward_kinematics(clip).positions == pytest.approx(turned)
     assert (clip.origin.cm_per_unit, clip.origin.up_axis) == (1.0, "Z")
-    still = read_character(tmp_path / "take.glb", cm_per_unit=1.0, up="Z")
+    still = read_character(tmp_path / "take.glb", Reading(cm_per_unit=1.0, up="Z"))
     assert still.skeleton.bind == pytest.approx(clip.skeleton.bind)
 
 

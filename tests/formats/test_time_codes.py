@@ -13,12 +13,12 @@ from builders.gltf_files import moving_arm
 from oracles.usdskel import assert_same_world
 from pxr import Sdf, Usd
 
+from usdhand import read_clip
 from usdhand.formats.fbx import read as fbx
 from usdhand.formats.usd.stage import find_character
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
-from usdhand.verbs import read_clip
 
 RATES = [24.0, 29.97, 30000 / 1001, 23.976, 59.94]
 FIRST, FRAMES = 1003, 12

@@ -13,6 +13,7 @@ from builders.blender import blender_python
 from conftest import REPOSITORY, SHARED, shared_data
 
 from usdhand.formats.fbx import read
+from usdhand.formats.reading import Reading
 from usdhand.formats.usd import read as usd
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.rigs import map_character
@@ -31,7 +32,9 @@ FIRST = {"SG_ASL_10_Alt": "SG ASL 10 Animation", "SG_ASL_7_2023": "SG ASL 7 Anim
 def clip_of(path: Path) -> Clip:
     names = [name for start, name in FIRST.items() if path.name.startswith(start)]
     several = len(read.animation_names(shared_data(*path.parts))) > 1
-    return read.read_clip(shared_data(*path.parts), animation=names[0] if several else None)
+    return read.read_clip(
+        shared_data(*path.parts), Reading(animation=names[0] if several else None)
+    )
 
 
 def below_scaled(clip: Clip) -> frozenset[int]:

@@ -427,12 +427,12 @@ def test_a_wrist_below_a_mirroring_joint(
     (body, plain), out = filled, tmp_path / "out.usdc"
     mirrored = mirror_below(body, tmp_path / "mirrored.usdc", top, signs)
     run("fill", mirrored, "--library", library, "-o", out, "--add-fingers")
-    clip = api.read_clip(out)
+    clip = usdhand.read_clip(out)
     times = clip.time_codes[::15]
     expected, found = (
         joint_worlds(path, clip.origin.skeleton_path, times)[..., :3, 3] for path in (plain, out)
     )
-    before = len(api.read_clip(body).skeleton)
+    before = len(usdhand.read_clip(body).skeleton)
     assert found.shape[1] > before + 30
     assert_allclose(found, expected, atol=1e-4)
     stage = Usd.Stage.Open(str(out))
@@ -440,7 +440,7 @@ def test_a_wrist_below_a_mirroring_joint(
     rest = np.array(prim.GetAttribute("restTransforms").Get())[before:, :3, :3]
     assert_allclose(np.linalg.det(rest), 1.0)
     bind = np.array(prim.GetAttribute("bindTransforms").Get())[:, :3, :3]
-    hand = api.find_hands(clip).character.hands["left" if top == "hand_l" else "right"]
+    hand = usdhand.find_hands(clip).character.hands["left" if top == "hand_l" else "right"]
     assert_allclose(np.linalg.det(bind[list(hand.joints.values())]), np.prod(signs))
 
 

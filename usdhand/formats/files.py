@@ -40,7 +40,7 @@ def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFA
     path, reading = Path(path), _with_skel(reading, skel)
     if is_usd(path):
         return usd.read_clip(path, _usd_skel(path, reading))
-    return legal_clip(_reader(path).read_clip(path, **_options(reading)))
+    return legal_clip(_reader(path).read_clip(path, reading))
 
 
 def read_character(path: str | Path, skel: str | None = None, reading: Reading = DEFAULT) -> Clip:
@@ -51,9 +51,7 @@ def read_character(path: str | Path, skel: str | None = None, reading: Reading =
     path, reading = Path(path), _with_skel(reading, skel)
     if is_usd(path):
         return usd.read_character(path, _usd_skel(path, reading))
-    options = _options(reading)
-    del options["animation"]
-    return legal_clip(_reader(path).read_character(path, **options))
+    return legal_clip(_reader(path).read_character(path, reading))
 
 
 def read_any(
@@ -148,15 +146,6 @@ def _reader(path: Path) -> Any:
 
 def _with_skel(reading: Reading, skel: str | None) -> Reading:
     return reading if skel is None else replace(reading, skel=skel)
-
-
-def _options(reading: Reading) -> dict[str, Any]:
-    return {
-        "skel": reading.skel,
-        "animation": reading.animation,
-        "cm_per_unit": reading.cm_per_unit,
-        "up": reading.up,
-    }
 
 
 def _usd_skel(path: Path, reading: Reading) -> str | None:

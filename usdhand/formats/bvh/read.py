@@ -14,6 +14,7 @@ from usdhand.formats.bvh.hierarchy import Hierarchy
 from usdhand.formats.bvh.motion import local_motion
 from usdhand.formats.bvh.pose import choose_bind, posed_skeleton
 from usdhand.formats.guess import guess_units, guess_up
+from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.motion import Clip, Origin, Problem, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import IDENTITY, Y_UP_FROM_Z_UP, Array
@@ -25,14 +26,7 @@ STILL_JOINTS = 4  # joints a channel, at most, beyond that
 NEAR_ZERO = 0.25  # of the OFFSET
 
 
-def read_clip(
-    path: Path,
-    *,
-    skel: str | None = None,
-    animation: str | None = None,
-    cm_per_unit: float | None = None,
-    up: str | None = None,
-) -> Clip:
+def read_clip(path: Path, reading: Reading = DEFAULT) -> Clip:
     """Read a BVH file.
 
     The channels of a joint turn it in their order, the first outermost; its position channels stand
@@ -42,34 +36,30 @@ def read_clip(
 
     Parameters
     ----------
-    skel : name of one of several ROOTs; without it, all together are one skeleton
-    animation : None or the file's stem, which is the name of its only animation
-    cm_per_unit, up : of the file, "Y" or "Z"; guessed if None
+    reading : ``skel`` is one of several ROOTs, without it all together are one skeleton;
+        ``animation`` is None or the file's stem; units and up axis are guessed if they are None
 
     Raises
     ------
     InputError
         if the file is damaged or has no motion, naming the line.
     UsageError
-        if ``skel`` or ``animation`` is not in the file.
+        if the skeleton or animation is not in the file.
     """
-    path = Path(path)
-    if animation not in (None, *animation_names(path)):
-        raise UsageError(f"{path} has one animation, '{path.stem}', and no '{animation}'.")
-    clip = _posed(path, skel, cm_per_unit, up)
+    if reading.animation not in (None, *animation_names(path)):
+        raise UsageError(f"{path} has one animation, '{path.stem}', and no '{reading.animation}'.")
+    clip = _posed(path, reading)
     if not len(clip):
         raise InputError(f"{path} has no motion: it has no frames or no channels.")
     return clip
 
 
-def read_character(
-    path: Path, *, skel: str | None = None, cm_per_unit: float | None = None, up: str | None = None
-) -> Clip:
+def read_character(path: Path, reading: Reading = DEFAULT) -> Clip:
     """Read a BVH file that may have no motion: a clip of one frame at its bind pose.
 
     Parameters and errors are those of `read_clip`.
     """
-    clip = _posed(Path(path), skel, cm_per_unit, up)
+    clip = _posed(path, reading)
     rest = clip.skeleton.rest[None]
     translations = rest[:, :, :3, 3].copy()
     return replace(
@@ -82,12 +72,14 @@ def read_character(
 
 def animation_names(path: Path) -> tuple[str, ...]:
     """Names of the animations in a file: one, the file's stem."""
-    return (Path(path).stem,)
+    return (path.stem,)
 
 
-def _posed(path: Path, skel: str | None, cm_per_unit: float | None, up: str | None) -> Clip:
+def _posed(path: Path, reading: Reading) -> Clip:
     """The motion, which may have no frames, with its bind pose."""
-    file = _chosen(parse_file(path), skel, path)
+    file = _chosen(parse_file(path), reading.skel, path)
+    cm_per_unit: float | None = reading.cm_per_unit
+    up: str | None = reading.up
     hierarchy, rows = file.hierarchy, file.rows
     _check_size(path, hierarchy, len(rows))
     rotations, translations = local_motion(hierarchy, rows)

@@ -12,6 +12,7 @@ from usdhand.errors import InputError
 from usdhand.formats.fbx.pose import bind_matrices, joint_locals, right_handed
 from usdhand.formats.fbx.scene import Sampled, Scene, load_scene
 from usdhand.formats.fbx.skeletons import FbxSkeleton, find_skeleton, find_take, keyed_takes
+from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP
@@ -19,23 +20,14 @@ from usdhand.motion.timing import DEFAULT_FPS
 from usdhand.motion.transforms import compose_trs
 
 
-def read_clip(
-    path: Path,
-    *,
-    skel: str | None = None,
-    animation: str | None = None,
-    cm_per_unit: float | None = None,
-    up: str | None = None,
-) -> Clip:
+def read_clip(path: Path, reading: Reading = DEFAULT) -> Clip:
     """Read the motion of one character.
 
     Parameters
     ----------
     path : an .fbx file, binary or ASCII
-    skel : name of the skeleton where there are several
-    animation : name of the animation (stack, take) where several have keys
-    cm_per_unit : centimetres of one unit of the file, instead of what it says itself
-    up : "Y" or "Z", instead of what the file says
+    reading : the skeleton where there are several, and the animation (stack, take) where several
+        have keys; units and up axis other than the file says
 
     Returns
     -------
@@ -49,10 +41,10 @@ def read_clip(
     UsageError
         if there are several skeletons or animations and none is chosen.
     """
-    scene = _meant(load_scene(path, animation), cm_per_unit, up)
-    sampled = find_take(scene, animation)
+    scene = _meant(load_scene(path, reading.animation), reading)
+    sampled = find_take(scene, reading.animation)
     take = sampled.take
-    rig = find_skeleton(scene, skel, take.moved)
+    rig = find_skeleton(scene, reading.skel, take.moved)
     if not rig.moves(take.moved):
         name = rig.name or rig.joints[0]
         raise InputError(f"{path}: the animation '{take.name}' does not move '{name}'.")
@@ -82,19 +74,14 @@ def read_clip(
     )
 
 
-def read_character(
-    path: Path,
-    *,
-    skel: str | None = None,
-    cm_per_unit: float | None = None,
-    up: str | None = None,
-) -> Clip:
+def read_character(path: Path, reading: Reading = DEFAULT) -> Clip:
     """Read a character that may have no motion: a clip of one frame at its bind pose.
 
     Raises the same errors as `read_clip`, except for what concerns its animations.
     """
-    scene = _meant(load_scene(path, sample=False), cm_per_unit, up)
-    rig = find_skeleton(scene, skel, frozenset().union(*(take.moved for take in scene.takes)))
+    scene = _meant(load_scene(path, sample=False), reading)
+    moved = frozenset[int]().union(*(take.moved for take in scene.takes))
+    rig = find_skeleton(scene, reading.skel, moved)
     problems = (*rig.problems, *_scene_problems(scene, rig))
     return Clip.at_bind_pose(_skeleton(scene, rig), path.stem, _origin(scene, rig), problems)
 
@@ -107,15 +94,15 @@ def animation_names(path: Path) -> tuple[str, ...]:
     return keyed_takes(load_scene(path, sample=False))
 
 
-def _meant(scene: Scene, cm_per_unit: float | None, up: str | None) -> Scene:
+def _meant(scene: Scene, reading: Reading) -> Scene:
     """The scene with the units and axes that the user says."""
-    unit = scene.cm_per_unit if cm_per_unit is None else cm_per_unit
+    unit = scene.cm_per_unit if reading.cm_per_unit is None else reading.cm_per_unit
     if not 1e-6 < unit < 1e9:
         raise InputError(f"{scene.path}: one unit is {unit:g} cm, which cannot be meant.")
     axes = scene.axes
-    if up is not None:
-        axes = Y_UP_FROM_Z_UP if up == "Z" else np.eye(3)
-    says_axes = scene.says_axes or up is not None
+    if reading.up is not None:
+        axes = Y_UP_FROM_Z_UP if reading.up == "Z" else np.eye(3)
+    says_axes = scene.says_axes or reading.up is not None
     return right_handed(replace(scene, cm_per_unit=unit, says_axes=says_axes), axes)
 
 

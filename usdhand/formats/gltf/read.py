@@ -16,6 +16,7 @@ from usdhand.formats.gltf.nodes import Tree, read_tree
 from usdhand.formats.gltf.placement import Motion, Space, find_placement, placed, sampled
 from usdhand.formats.gltf.poses import bind_matrices
 from usdhand.formats.gltf.vrm import Humanoid, read_humanoid
+from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.motion import Clip, Origin, Problem, Skeleton
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP
 from usdhand.motion.timing import DEFAULT_FPS, MOST_FRAMES, Timing, find_timing
@@ -26,23 +27,14 @@ MOST_VALUES = 20_000_000  # frames times joints: 55 minutes of 100 joints at 60 
 MOST_PATH_LETTERS = 20_000_000
 
 
-def read_clip(
-    path: Path,
-    *,
-    skel: str | None = None,
-    animation: str | None = None,
-    cm_per_unit: float | None = None,
-    up: str | None = None,
-) -> Clip:
+def read_clip(path: Path, reading: Reading = DEFAULT) -> Clip:
     """Read the motion of one character.
 
     Parameters
     ----------
     path : a .glb, .gltf, .vrm or .vrma file
-    skel : name of the skeleton where there are several
-    animation : name of the animation where there are several
-    cm_per_unit : centimetres of one unit; metres by default, as glTF says
-    up : "Y" or "Z"; "Y" by default, as glTF says
+    reading : the skeleton and the animation where there are several; units and axes that are not
+        metres and Y up, as glTF has them
 
     Raises
     ------
@@ -52,19 +44,16 @@ def read_clip(
         if there are several and none is chosen.
     """
     with np.errstate(all="ignore"):  # whatever is no number is refused by name
-        scene = _scene(path, skel)
-        return _animated(scene, animation, cm_per_unit, up)
+        return _animated(_scene(path, reading))
 
 
-def read_character(
-    path: Path, *, skel: str | None = None, cm_per_unit: float | None = None, up: str | None = None
-) -> Clip:
+def read_character(path: Path, reading: Reading = DEFAULT) -> Clip:
     """Read a character that may have no motion: a clip of one frame at its bind pose.
 
     Raises the same errors as `read_clip`, except for a missing animation.
     """
     with np.errstate(all="ignore"):
-        return _still(_scene(path, skel), cm_per_unit, up)
+        return _still(_scene(path, reading))
 
 
 def animation_names(path: Path) -> tuple[str, ...]:
@@ -81,8 +70,9 @@ def animation_names(path: Path) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """A file and the character chosen in it."""
+    """A file, the character chosen in it, and how else it is read."""
 
+    reading: Reading
     document: Document
     tree: Tree
     humanoid: Humanoid
@@ -99,20 +89,37 @@ class _Scene:
         above = [place.get(int(self.tree.parents[node]), -1) for node in self.nodes]
         return np.array(above, dtype=np.intp)
 
+    @property
+    def space(self) -> Space:
+        """Units and axes that the file is read in."""
+        cm, up = self.reading.cm_per_unit, self.reading.up
+        axes = Y_UP_FROM_Z_UP if up == "Z" else np.eye(3)
+        return Space(CM_PER_UNIT if cm is None else cm, axes)
 
-def _scene(path: Path, skel: str | None) -> _Scene:
+    @property
+    def origin(self) -> Origin:
+        """Where its clip comes from, but for its animation and time."""
+        return Origin(
+            path=self.document.path,
+            skeleton_path="" if self.character.alone else self.character.names[0],
+            cm_per_unit=self.space.unit,
+            up_axis=self.reading.up or "Y",
+        )
+
+
+def _scene(path: Path, reading: Reading) -> _Scene:
     document = read_document(path)
     tree, humanoid = read_tree(document), read_humanoid(document)
     moving = moved_nodes(document)
     moved: set[int] = set().union(*moving.values())
-    character = find_character(document, tree, humanoid, moved, skel)
-    return _Scene(document, tree, humanoid, moving, character)
+    character = find_character(document, tree, humanoid, moved, reading.skel)
+    return _Scene(reading, document, tree, humanoid, moving, character)
 
 
-def _animated(scene: _Scene, animation: str | None, cm: float | None, up: str | None) -> Clip:
+def _animated(scene: _Scene) -> Clip:
     document, tree, nodes, parents = scene.document, scene.tree, scene.nodes, scene.parents
     names = names_of(document, scene.moving)
-    number = choose(document.path, names, animation)
+    number = choose(document.path, names, scene.reading.animation)
     name = names[number]
     above = {node for joint in np.flatnonzero(parents < 0) for node in tree.above(nodes[joint])}
     curves, problems = read_curves(
@@ -136,15 +143,15 @@ def _animated(scene: _Scene, animation: str | None, cm: float | None, up: str | 
         )
     motion = Motion(curves, timing)
     q, t, s = sampled(tree, nodes, motion)
-    placement, found = find_placement(tree, nodes, parents, s, motion, _space(cm, up))
+    placement, found = find_placement(tree, nodes, parents, s, motion, scene.space)
     rotations, translations, scales = placed(q, t, s, parents, placement)
     origin = replace(
-        _origin(scene, cm, up),
+        scene.origin,
         animation_path=name,
         time_codes_per_second=timing.fps,
         first_time_code=_first_frame(timing),
     )
-    skeleton, missing = _skeleton(scene, cm, up)
+    skeleton, missing = _skeleton(scene)
     guess = _guess(timing)
     guessed = (Problem("guessed-fps", guess, name, "note"),) if guess else ()
     return Clip(
@@ -159,18 +166,16 @@ def _animated(scene: _Scene, animation: str | None, cm: float | None, up: str | 
     )
 
 
-def _still(scene: _Scene, cm: float | None, up: str | None) -> Clip:
-    skeleton, problems = _skeleton(scene, cm, up)
-    origin = replace(_origin(scene, cm, up), time_codes_per_second=DEFAULT_FPS)
+def _still(scene: _Scene) -> Clip:
+    skeleton, problems = _skeleton(scene)
+    origin = replace(scene.origin, time_codes_per_second=DEFAULT_FPS)
     return Clip.at_bind_pose(skeleton, scene.document.path.stem, origin, problems)
 
 
-def _skeleton(
-    scene: _Scene, cm: float | None, up: str | None
-) -> tuple[Skeleton, tuple[Problem, ...]]:
+def _skeleton(scene: _Scene) -> tuple[Skeleton, tuple[Problem, ...]]:
     """Joints with their bind pose, and as rest pose the default transforms of the nodes."""
     tree, nodes, parents = scene.tree, scene.nodes, scene.parents
-    space, pose = _space(cm, up), Motion({})
+    space, pose = scene.space, Motion({})
     q, t, s = sampled(tree, nodes, pose)
     placement, odd = find_placement(tree, nodes, parents, s, pose, space)
     q, t, _ = placed(q, t, s, parents, placement)
@@ -186,10 +191,6 @@ def _skeleton(
     return Skeleton(_joint_paths(scene), parents, bind, rest, aliases), (*odd, *problems)
 
 
-def _space(cm: float | None, up: str | None) -> Space:
-    return Space(CM_PER_UNIT if cm is None else cm, Y_UP_FROM_Z_UP if up == "Z" else np.eye(3))
-
-
 def _joint_paths(scene: _Scene) -> tuple[str, ...]:
     """Full paths of the joints; of siblings with one name the later ones get a number."""
     paths: list[str] = []
@@ -203,15 +204,6 @@ def _joint_paths(scene: _Scene) -> tuple[str, ...]:
         if letters > MOST_PATH_LETTERS:
             scene.tree.elements[node].refuse("has too long a name, or too many joints above it")
     return tuple(paths)
-
-
-def _origin(scene: _Scene, cm: float | None, up: str | None) -> Origin:
-    return Origin(
-        path=scene.document.path,
-        skeleton_path="" if scene.character.alone else scene.character.names[0],
-        cm_per_unit=CM_PER_UNIT if cm is None else cm,
-        up_axis=up or "Y",
-    )
 
 
 def _first_frame(timing: Timing) -> float:
