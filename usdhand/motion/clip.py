@@ -94,12 +94,14 @@ class Clip:
     @property
     def time_codes(self) -> Array:
         """(frames,) time codes in its file."""
-        return self.time_codes_of(np.arange(float(len(self))))
-
-    def time_codes_of(self, frames: Array) -> Array:
-        """Time codes (n,) of frame numbers (n,) in its file."""
         origin = self.origin
+        frames = np.arange(len(self), dtype=np.float64)
         return time_codes(frames, origin.first_time_code, origin.time_codes_per_frame)
+
+    def time_code(self, frame: float) -> float:
+        """Time code of a frame in its file."""
+        origin = self.origin
+        return float(time_codes(frame, origin.first_time_code, origin.time_codes_per_frame))
 
     def with_rotations(self, rotations: Array) -> Clip:
         """Return the same clip with other joint rotations."""

@@ -60,7 +60,7 @@ def recounted_code(time_code: float, old: float, new: float) -> float:
     return float(exact(time_code) * exact(new) / exact(old))
 
 
-def time_codes(frames: Array, first: float, step: float) -> Array:
+def time_codes(frames: Array | float, first: float, step: float) -> Array:
     """Time codes of frame numbers (n,), each the float nearest to the exact one.
 
     Parameters
@@ -71,7 +71,7 @@ def time_codes(frames: Array, first: float, step: float) -> Array:
         start, by = exact(first), exact(step)
         whole = math.lcm(start.denominator, by.denominator)
         a, b = int(start * whole), int(by * whole)
-        largest = abs(a) + float(np.abs(frames).max(initial=0.0)) * abs(b)
+        largest = abs(a) + float(np.max(np.abs(frames), initial=0.0)) * abs(b)
         if max(largest, whole) < _LARGEST_WHOLE:
             return np.asarray((a + frames * b) / whole)
     return np.asarray(first + frames * step)
@@ -165,7 +165,7 @@ class Timing:
         """(count,) times of the frames, those of the keys where each frame has one."""
         if self.rhythm != "uneven" and len(self.keys) == self.count:
             return self.keys
-        return time_codes(np.arange(float(self.count)), self.start, self.step)
+        return time_codes(np.arange(self.count, dtype=np.float64), self.start, self.step)
 
     def frames(self, times: Array) -> Array:
         """Frame numbers of key times; those meant to lie on a frame do so exactly."""

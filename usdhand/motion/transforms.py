@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.motion import rotations as rot
-from usdhand.motion.rotations import Array
+from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
 
 FLAT = 1e-12  # a singular value up to this flattens everything
 # Each quaternion component of a diagonal matrix of ones and minus ones, four times, less one.
@@ -21,6 +21,11 @@ _HALF_TURNS: Array = np.array(
 def unit(v: Array) -> Array:
     """Vectors (..., n) scaled to length 1; a zero vector stays zero."""
     return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12))
+
+
+def to_y_up(up: str) -> Array:
+    """Rotation (3, 3) from axes of which "Y" or "Z" is up to those with Y up."""
+    return Y_UP_FROM_Z_UP if up == "Z" else np.eye(3)
 
 
 def affine(linear: Array, translation: Array) -> Array:

@@ -77,5 +77,4 @@ def _pin_data(pin: Pin) -> dict[str, Any]:
 
 def _time_code(clip: Clip, seconds: float) -> float:
     """Time code of a clip's frame nearest to seconds from its first frame."""
-    o = clip.origin
-    return o.first_time_code + round(seconds * clip.fps) * o.time_codes_per_frame
+    return clip.time_code(round(seconds * clip.fps))

@@ -55,11 +55,11 @@ def held_poses(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) -> list
         before = int(np.searchsorted(warp, 1e-6, "right"))
         after = int(np.searchsorted(warp, hand_clip.duration - 1e-6))
         if before > least:
-            at = _time_code(body, before - 1)
+            at = body.time_code(before - 1)
             text = f"begins at time code {at:g} of the body, fingers hold its first pose until then"
             held.setdefault(text, []).append(side)
         if len(body) - after > least:
-            at = _time_code(body, after)
+            at = body.time_code(after)
             text = f"ends at time code {at:g} of the body, fingers hold its last pose from there on"
             held.setdefault(text, []).append(side)
     return [f"the hand clip {text} ({' and '.join(s)})" for text, s in held.items()]
@@ -68,7 +68,3 @@ def held_poses(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) -> list
 def _move(clip: Clip, frames: HandFrames) -> bool:
     values = encode(clip, frames).values
     return bool(values.size and np.ptp(values, axis=0).max() > STILL_DEG)
-
-
-def _time_code(clip: Clip, frame: int) -> float:
-    return clip.origin.first_time_code + frame * clip.origin.time_codes_per_frame

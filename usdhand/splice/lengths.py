@@ -113,6 +113,4 @@ def _sentence(text: str) -> str:
 
 def _time_code(clip: Clip, seconds: float) -> float:
     """Time code of a clip's frame nearest to seconds from its first frame."""
-    o = clip.origin
-    frame = min(round(seconds * clip.fps), len(clip) - 1)
-    return o.first_time_code + frame * o.time_codes_per_frame
+    return clip.time_code(min(round(seconds * clip.fps), len(clip) - 1))

@@ -12,6 +12,7 @@ from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import unit
 
 # How far from the wrist the markers are, as shares of the distance to the middle knuckle and to the
 # elbow. They can stand off further than glued ones, and then tell more about rotation.
@@ -138,4 +139,4 @@ def _facing(clip: Clip, hands: Hands, at: Array) -> Array | None:
     own = clip.skeleton.bind_rotations[character.chest].T @ (places[left] - places[right])
     turned = rot.rotate(forward_kinematics(clip, [character.chest]).rotation(character.chest), own)
     level = interpolate(turned, at)[:, [0, 2]]
-    return np.asarray(level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9))
+    return unit(level)

@@ -15,7 +15,8 @@ from usdhand.formats.bvh.euler import zxy_angles
 from usdhand.motion import Clip, Pose, Problem, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.kinematics import scaled_joints
-from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
+from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import to_y_up
 
 MOVES_CM = 5e-4  # a joint that is farther from its place at the bind pose gets position channels
 TURNS_DEG = 1e-3  # an end that turns more is a joint
@@ -90,7 +91,7 @@ class _Aligned:
     @classmethod
     def of(cls, clip: Clip, up: str) -> _Aligned:
         skeleton = clip.skeleton
-        axes = Y_UP_FROM_Z_UP if up == "Z" else np.eye(3)
+        axes = to_y_up(up)
         places, parents = skeleton.bind_positions, skeleton.parents
         above = np.where(parents[:, None] < 0, 0.0, places[parents])
         pose = forward_kinematics(clip) if scaled_joints(clip) else None

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from usdhand.errors import InputError
 from usdhand.formats.fbx.pose import bind_matrices, joint_locals, right_handed
 from usdhand.formats.fbx.scene import Sampled, Scene, load_scene
@@ -15,9 +13,8 @@ from usdhand.formats.fbx.skeletons import FbxSkeleton, find_skeleton, find_take,
 from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
-from usdhand.motion.rotations import Y_UP_FROM_Z_UP
 from usdhand.motion.timing import DEFAULT_FPS
-from usdhand.motion.transforms import compose_trs
+from usdhand.motion.transforms import compose_trs, to_y_up
 
 
 def read_clip(path: Path, reading: Reading = DEFAULT) -> Clip:
@@ -99,9 +96,7 @@ def _meant(scene: Scene, reading: Reading) -> Scene:
     unit = scene.cm_per_unit if reading.cm_per_unit is None else reading.cm_per_unit
     if not 1e-6 < unit < 1e9:
         raise InputError(f"{scene.path}: one unit is {unit:g} cm, which cannot be meant.")
-    axes = scene.axes
-    if reading.up is not None:
-        axes = Y_UP_FROM_Z_UP if reading.up == "Z" else np.eye(3)
+    axes = scene.axes if reading.up is None else to_y_up(reading.up)
     says_axes = scene.says_axes or reading.up is not None
     return right_handed(replace(scene, cm_per_unit=unit, says_axes=says_axes), axes)
 

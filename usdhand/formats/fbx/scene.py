@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from usdhand.errors import InputError
 from usdhand.motion.rotations import Array
-from usdhand.motion.timing import find_timing
+from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS, find_timing
 
 WORKER = Path(__file__).with_name("worker.py")
 TIME_LIMIT = 300.0  # seconds for one file
@@ -121,6 +121,7 @@ def load_scene(path: Path, animation: str | None = None, *, sample: bool = True)
         "sample": sample,
         "animation": animation,
         "fps": None,
+        "rates": [SLOWEST_FPS, FASTEST_FPS],
         "memory": MEMORY_LIMIT + 10 * path.stat().st_size,
     }
     said, numbers = _ask(request, path)

@@ -1,7 +1,8 @@
 """What the ufbx library says of one FBX file, as JSON and numbers on standard output.
 
 usage: python -I -S worker.py '{"library": FOLDER_OF_UFBX, "path": FILE.fbx, "sample": true,
-    "animation": NAME or null, "fps": what a file does not say or null, "memory": BYTES}'
+    "animation": NAME or null, "fps": what a file does not say or null, "memory": BYTES,
+    "rates": [SLOWEST, FASTEST] that a file may mean}'
 
 Runs in a process of its own, because a damaged file can crash a C library, and because the
 bindings (0.0.5) count references wrongly: an element that is asked for twice is freed while it is
@@ -50,7 +51,7 @@ def main(request: dict[str, Any]) -> None:
     except (ufbx.UfbxError, ValueError) as error:
         return _answer({"error": str(error)})
     nodes, stacks = held(scene.nodes), held(scene.anim_stacks)
-    header = _header(scene, nodes, stacks)
+    header = _header(scene, nodes, stacks, request["rates"])
     keys = [stack.pop("keys") for stack in header["stacks"]]
     name = request["animation"]
     keyed = [i for i, stack in enumerate(header["stacks"]) if stack["moved"]]
@@ -84,16 +85,18 @@ def _load(ufbx: Any, path: str) -> Any:
     )
 
 
-def _header(scene: Any, nodes: list[Any], stacks: list[Any]) -> dict[str, Any]:
+def _header(
+    scene: Any, nodes: list[Any], stacks: list[Any], rates: tuple[float, float]
+) -> dict[str, Any]:
     """Everything but the samples; ``fps`` is None where the file does not say."""
     index = {node.element_id: i for i, node in enumerate(nodes)}
     settings = scene.settings
-    fps = settings.frames_per_second
+    fps, said = settings.frames_per_second, settings.time_mode.name != "DEFAULT"
     return {
         "version": scene.metadata.version,
         "unit_meters": settings.unit_meters,
         "axes": [int(axis) for axis in settings.axes],
-        "fps": fps if settings.time_mode.name != "DEFAULT" and 0.1 <= fps <= 1e4 else None,
+        "fps": fps if said and rates[0] <= fps <= rates[1] else None,
         "nodes": [_node(node, index) for node in nodes],
         "stacks": [_stack(stack, index) for stack in stacks],
         **_bind(scene, index),

@@ -18,9 +18,8 @@ from usdhand.formats.gltf.poses import bind_matrices
 from usdhand.formats.gltf.vrm import Humanoid, read_humanoid
 from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.motion import Clip, Origin, Problem, Skeleton
-from usdhand.motion.rotations import Y_UP_FROM_Z_UP
 from usdhand.motion.timing import DEFAULT_FPS, MOST_FRAMES, Timing, find_timing
-from usdhand.motion.transforms import compose_trs
+from usdhand.motion.transforms import compose_trs, to_y_up
 
 CM_PER_UNIT = 100.0
 MOST_VALUES = 20_000_000  # frames times joints: 55 minutes of 100 joints at 60 fps
@@ -92,9 +91,8 @@ class _Scene:
     @property
     def space(self) -> Space:
         """Units and axes that the file is read in."""
-        cm, up = self.reading.cm_per_unit, self.reading.up
-        axes = Y_UP_FROM_Z_UP if up == "Z" else np.eye(3)
-        return Space(CM_PER_UNIT if cm is None else cm, axes)
+        cm = self.reading.cm_per_unit
+        return Space(CM_PER_UNIT if cm is None else cm, to_y_up(self.reading.up or "Y"))
 
     @property
     def origin(self) -> Origin:

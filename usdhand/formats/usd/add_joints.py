@@ -9,7 +9,7 @@ from pxr import Gf, Sdf, UsdSkel, Vt
 
 from usdhand.formats.usd.names import ALIASES, ORIGINALS
 from usdhand.formats.usd.stage import Character
-from usdhand.formats.usd.world import world_above
+from usdhand.formats.usd.world import World, world_above
 from usdhand.motion import Skeleton
 from usdhand.motion.rotations import Array
 
@@ -37,17 +37,13 @@ def author_joints(layer: Sdf.Layer, character: Character, skeleton: Skeleton) ->
     bind = prim.GetBindTransformsAttr().Get()
     local = _in_units(skeleton.rest, world.scale)
     if rest is None or len(rest) != len(own):
-        local[skeleton.parents < 0] = _below(
-            skeleton.rest[skeleton.parents < 0],
-            world.rotation[0],
-            world.translation[0],
-            world.scale,
-        )
+        roots = skeleton.parents < 0
+        local[roots] = _below(skeleton.rest[roots], world)
         all_rest = local
     else:
         all_rest = np.concatenate([_matrices(rest), local[len(own) :]])
     if bind is None or len(bind) != len(own):
-        all_bind = _below(skeleton.bind, world.rotation[0], world.translation[0], world.scale)
+        all_bind = _below(skeleton.bind, world)
     else:
         # From the wrist's own matrix, in whatever space the exporter wrote it.
         all_bind = np.concatenate([_matrices(bind), np.empty((len(more), 4, 4))])
@@ -93,9 +89,6 @@ def _in_units(matrices: Array, unit: float) -> Array:
     return result
 
 
-def _below(matrices: Array, rotation: Array, translation: Array, unit: float) -> Array:
-    """World matrices (n, 4, 4) in the space below a placement, in the file's units."""
-    result = matrices.copy()
-    result[:, :3, :3] = rotation.T @ matrices[:, :3, :3]
-    result[:, :3, 3] = (matrices[:, :3, 3] - translation) @ rotation / unit
-    return result
+def _below(matrices: Array, world: World) -> Array:
+    """World matrices (n, 4, 4) in the space of the skeleton, in the file's units."""
+    return _in_units(np.linalg.inv(world.first) @ matrices, world.scale)

@@ -10,8 +10,8 @@ from pxr import Usd, UsdGeom
 from usdhand.errors import InputError
 from usdhand.formats.above import scale_problems
 from usdhand.motion import Problem
-from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
-from usdhand.motion.transforms import affine, mean_scale, nearest_rotation
+from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import affine, mean_scale, nearest_rotation, to_y_up
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ def world_above(skeleton: Usd.Prim, times: Array | None = None) -> World:
         raise InputError(
             f"{stage.GetRootLayer().realPath}: {skeleton.GetPath()} stands under a zero scale."
         )
-    axes = Y_UP_FROM_Z_UP if str(UsdGeom.GetStageUpAxis(stage)) == "Z" else np.eye(3)
+    axes = to_y_up(str(UsdGeom.GetStageUpAxis(stage)))
     cm = 100.0 * UsdGeom.GetStageMetersPerUnit(stage)
     if not 0 < cm < np.inf:
         raise InputError(f"{stage.GetRootLayer().realPath}: metersPerUnit is {cm / 100.0:g}.")
