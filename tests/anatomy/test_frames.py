@@ -279,12 +279,18 @@ def knuckles_on_one_line(at: Places) -> None:
         at["left", finger + "MCP"] = wrist + np.array([6.0 + i, 0.0, 0.0])
 
 
+def a_knuckle_on_the_wrist(at: Places) -> None:
+    for side in SIDES:
+        at[side, "RingMCP"] = at[side, "wrist"]
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         (all_on_one_spot, "bind"),
         (one_bone_without_length, "IndexMCP"),
         (knuckles_on_one_line, "one line"),
+        (a_knuckle_on_the_wrist, "wrist' and the next one of its digit lie on one spot"),
     ],
 )
 def test_a_bind_pose_without_directions_is_refused(
