@@ -9,10 +9,11 @@ from typing import Any
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.reading import DEFAULT, Reading
+from usdhand.formats.sources import remembered
 from usdhand.formats.suffixes import FORMATS, READABLE, USD_SUFFIXES
 from usdhand.formats.usd import read as usd
-from usdhand.formats.usd.character import character_of, legal_clip
-from usdhand.formats.usd.stage import Character, find_character
+from usdhand.formats.usd.character import legal_clip
+from usdhand.formats.usd.stage import find_character
 from usdhand.motion import Clip, Problem
 
 
@@ -28,7 +29,8 @@ def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFA
     Returns
     -------
     Clip
-        with everything that is odd or was guessed in ``problems``.
+        with everything that is odd or was guessed in ``problems``, and what it was read from as its
+        ``source``, to be written over.
 
     Raises
     ------
@@ -40,7 +42,8 @@ def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFA
     path, reading = Path(path), _with_skel(reading, skel)
     if is_usd(path):
         return usd.read_clip(path, _usd_skel(path, reading))
-    return legal_clip(_reader(path).read_clip(path, reading))
+    clip = _reader(path).read_clip(path, reading)
+    return remembered(legal_clip(clip), animated=True)
 
 
 def read_character(path: str | Path, skel: str | None = None, reading: Reading = DEFAULT) -> Clip:
@@ -51,7 +54,8 @@ def read_character(path: str | Path, skel: str | None = None, reading: Reading =
     path, reading = Path(path), _with_skel(reading, skel)
     if is_usd(path):
         return usd.read_character(path, _usd_skel(path, reading))
-    return legal_clip(_reader(path).read_character(path, reading))
+    clip = _reader(path).read_character(path, reading)
+    return remembered(legal_clip(clip), animated=False)
 
 
 def read_any(
@@ -75,35 +79,6 @@ def animation_names(path: str | Path) -> tuple[str, ...]:
     """Names of the animations that a file holds; ("",) for USD, where one is bound."""
     path = Path(path)
     return ("",) if is_usd(path) else tuple(_reader(path).animation_names(path))
-
-
-def source_file(clip: Clip) -> Path:
-    """Return the file that a clip was read from; InputError for a clip made in memory."""
-    if clip.origin.path is None:
-        raise InputError(f"{clip.name}: this clip was not read from a file, so there is no stage.")
-    return clip.origin.path
-
-
-def reopened(clip: Clip) -> Character:
-    """Return the character that a clip was read from, to write over it.
-
-    Raises
-    ------
-    InputError
-        if the clip was not read from a file.
-    """
-    path, origin = source_file(clip), clip.origin
-    if is_usd(path):
-        return find_character(path, origin.skeleton_path)
-    reading = Reading(
-        origin.skeleton_path or None,
-        origin.animation_path or None,
-        origin.cm_per_unit,
-        "Z" if origin.up_axis == "Z" else "Y",
-    )
-    animated = bool(origin.animation_path)
-    source = (read_clip if animated else read_character)(path, None, reading)
-    return character_of(source, animated=animated)
 
 
 def write_other(clip: Clip, path: Path, suffix: str, up: str = "Y") -> tuple[Problem, ...]:

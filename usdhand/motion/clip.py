@@ -52,6 +52,9 @@ class Clip:
     translations : (frames, joints, 3) joint-to-parent, cm
     scales : (frames, joints, 3); all ones for nearly every clip, all negative for a mirrored joint
     fps : frames a second
+    source : what the clip was read from, to be written over; None for a clip made in memory. Only
+        `usdhand.formats` looks inside. The stage of a USD file is held open by it: replace it by
+        None in clips that are kept in great numbers and not written
     """
 
     skeleton: Skeleton
@@ -62,6 +65,7 @@ class Clip:
     name: str = ""
     origin: Origin = field(default_factory=Origin)
     problems: tuple[Problem, ...] = ()
+    source: object | None = field(default=None, repr=False)
 
     @classmethod
     def at_bind_pose(

@@ -49,8 +49,11 @@ def trim(clip: Clip, first: float | None, last: float | None) -> Clip:
 
 
 def counted_in_frames(clip: Clip) -> Clip:
-    """Return the clip with a time code a frame, as files have that are made anew."""
-    return recounted(clip, clip.fps)
+    """Return the clip with a time code a frame, as files have that are made anew.
+
+    It has no source any more: time codes of that count otherwise.
+    """
+    return replace(recounted(clip, clip.fps), source=None)
 
 
 def recounted(clip: Clip, per_second: float) -> Clip:
@@ -81,6 +84,8 @@ def starting_at(clip: Clip, time_code: float) -> Clip:
 def scaled(clip: Clip, factor: float) -> Clip:
     """Return the clip with a character of ``factor`` times its size.
 
+    It has no source any more: that character is another one.
+
     Raises
     ------
     UsageError
@@ -92,7 +97,8 @@ def scaled(clip: Clip, factor: float) -> Clip:
     bind[:, :3, 3] *= factor
     rest[:, :3, 3] *= factor
     skeleton = replace(clip.skeleton, bind=bind, rest=rest)
-    return replace(clip, skeleton=skeleton, translations=clip.translations * factor)
+    translations = clip.translations * factor
+    return replace(clip, skeleton=skeleton, translations=translations, source=None)
 
 
 def in_place(clip: Clip, hips: int) -> Clip:

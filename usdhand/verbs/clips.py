@@ -7,7 +7,10 @@ from pathlib import Path
 
 from usdhand.anatomy import SIDES, Hands, Side
 from usdhand.errors import HandNotFoundError, UsageError
-from usdhand.formats.files import reopened
+from usdhand.formats.output import check_output
+from usdhand.formats.sources import character_under
+from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.formats.usd.convert import write_made
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip, Problem
 from usdhand.rigs import Conventions, load_conventions, map_character
@@ -59,17 +62,20 @@ def write_clip(
 ) -> tuple[Problem, ...]:
     """Write a clip's hands as a layer over the file it was read from; the body stays as it is.
 
-    Returns what one file, if it was to be one, could not keep.
+    A clip without a source, which was made in memory, is written as a file with a complete
+    character. Returns what one file, if it was to be one, could not keep.
 
     Raises
     ------
-    InputError
-        if the clip was not read from a file.
     OutputError
         if the output is refused or cannot be written.
     """
-    character = reopened(clip)
+    output = Path(output)
+    if clip.source is None:
+        check_output(output, [p for p in (clip.origin.path, *inputs) if p], force, USD_SUFFIXES)
+        return write_made(clip, output)
     changed = [j for f in find_hands(clip, conventions).frames.values() for j in f.links.moving]
+    character = character_under(clip)
     return write_motion(
-        character, clip, changed, Path(output), flatten=flatten, force=force, inputs=inputs
+        character, clip, changed, output, flatten=flatten, force=force, inputs=inputs
     )

@@ -27,11 +27,9 @@ from usdhand.formats.output import (
     written_beside,
 )
 from usdhand.formats.reading import DEFAULT, Reading
+from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES, WRITABLE
-from usdhand.formats.usd.character import character_of, legal_clip
-from usdhand.formats.usd.convert import StageEdit, placed, write_placed
-from usdhand.formats.usd.stage import find_character
-from usdhand.formats.usd.write import save_layer
+from usdhand.formats.usd.convert import StageEdit, placed, write_made, write_placed
 from usdhand.motion import Clip, Problem, resample
 from usdhand.motion.editing import (
     counted_in_frames,
@@ -101,10 +99,10 @@ def convert(
     lost: tuple[Problem, ...] = ()
     source, animated = read_any(path, reading=reading)
     if onto is None:
-        body, body_file, body_reading, fingers = source, Path(path), reading, None
+        body, body_file, fingers = source, Path(path), None
     else:
         body, unread = _character(Path(onto), onto_reading)
-        body_file, body_reading, fingers, animated = Path(onto), onto_reading, source, True
+        body_file, fingers, animated = Path(onto), source, True
         lost = (*unread, *_left_out(source, body, conventions))
     usd_to_usd = is_usd(body_file) and output.suffix.lower() in USD_SUFFIXES
 
@@ -117,7 +115,7 @@ def convert(
         clip, placement = _placed(motion(body), edits, retimed=fingers is not None)
         edited = edits.of_frames or fingers is not None
         if not dry_run:
-            character = placed(find_character(body_file, body_reading.skel), placement)
+            character = placed(character_under(body), placement)
             lost += write_placed(character, clip, output, edited=edited, force=force, inputs=inputs)
     else:
         clip = scaled(counted_in_frames(motion(body)), edits.scale)
@@ -165,9 +163,7 @@ def write_new(
     suffix = output.suffix.lower()
     check_output(output, [p for p in [clip.origin.path] if p], force, WRITABLE)
     if suffix in USD_SUFFIXES:
-        stage = character_of(legal_clip(clip), up=up, animated=animated).stage
-        save_layer(stage.GetRootLayer(), output, flatten=False)
-        return ()
+        return write_made(clip, output, up=up, animated=animated)
     with written_beside(output) as temporary:
         return write_other(clip, temporary, suffix, up)
 

@@ -15,7 +15,7 @@ from usdhand.fill.candidates import SearchSpace
 from usdhand.fill.library import LibraryClip, MotionLibrary, Part
 from usdhand.fill.method import moving_sides, space_for
 from usdhand.fill.settings import FillSettings
-from usdhand.formats.files import read_clip, source_file
+from usdhand.formats.files import read_clip
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.library import read_library
 from usdhand.motion import Clip
@@ -85,7 +85,7 @@ def measure_library(
                 library,
                 settings,
                 sides=moving,
-                content_hash=file_hash(source_file(clip)),
+                content_hash=file_hash(clip.origin.path) if clip.origin.path else None,
                 spaces=None if settings.couple else spaces,
             )
         except UsdHandError as error:
@@ -160,7 +160,7 @@ def _read(paths: Sequence[Path], journal: Journal) -> tuple[list[Clip], list[Pro
     clips, left = [], []
     for path in journal.each(paths, "reading"):
         try:
-            clips.append(read_clip(path))
+            clips.append(replace(read_clip(path), source=None))  # none of them is written
         except UsdHandError as error:
             left.append(Problem("left-out", str(error), file=str(path)))
     return clips, left

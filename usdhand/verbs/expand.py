@@ -26,9 +26,7 @@ def expand(
 
     ``skel`` chooses a rig by its skeleton where the file has several.
     """
-    stored = usd_rig.read_stored_rig(path, skel)
-    hands = usd_rig.with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
-    return expand_channels(stored.rig, stored.free, stored.clip, hands)
+    return _expanded(usd_rig.read_stored_rig(path, skel), conventions)
 
 
 def expand_onto(
@@ -41,10 +39,7 @@ def expand_onto(
 
     The body keeps the target's own motion, its ends held, or its bind pose where it has none.
     """
-    stored = usd_rig.read_stored_rig(path)
-    body, _ = read_any(target, skel)
-    body = in_time_of(body, stored.clip)
-    return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
+    return _expanded_onto(usd_rig.read_stored_rig(path), target, skel, conventions)
 
 
 def run(request: ExpandRequest, journal: Journal) -> Outcome:
@@ -53,10 +48,11 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
     conventions = conventions_from(request.maps)
     inputs = [rig] if onto is None else [rig, onto]
     check_output(request.output, inputs, request.force, USD_SUFFIXES)
+    stored = usd_rig.read_stored_rig(rig, skel if onto is None else None)
     if onto is None:
-        motion = expand(rig, conventions, skel)
+        motion = _expanded(stored, conventions)
     else:
-        motion = expand_onto(rig, onto, skel, conventions)
+        motion = _expanded_onto(stored, onto, skel, conventions)
     journal.about(motion.origin.path, motion.problems, "warning")
     if not request.dry_run:
         lost = write_clip(
@@ -70,9 +66,21 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
         journal.about(request.output, lost, "warning", "note")
 
     def report() -> dict[str, Any]:
-        free = len(usd_rig.read_rig(rig, None if onto else skel).free)
         output = None if request.dry_run else str(request.output)
-        return {"output": output} | expand_result(motion, free)
+        return {"output": output} | expand_result(motion, len(stored.rig.free))
 
     written = () if request.dry_run else (request.output,)
     return Outcome(request, (*inputs, *request.maps), report, summary, written=written)
+
+
+def _expanded(stored: usd_rig.StoredRig, conventions: Conventions | None) -> Clip:
+    hands = usd_rig.with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
+    return expand_channels(stored.rig, stored.free, stored.clip, hands)
+
+
+def _expanded_onto(
+    stored: usd_rig.StoredRig, target: str | Path, skel: str | None, conventions: Conventions | None
+) -> Clip:
+    body, _ = read_any(target, skel)
+    body = in_time_of(body, stored.clip)
+    return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))

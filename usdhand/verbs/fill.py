@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from usdhand.anatomy import SIDES, Side
-from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.errors import HandNotFoundError, UsageError, UsdHandError
 from usdhand.fill.library import MotionLibrary
 from usdhand.fill.method import fill
 from usdhand.fill.results import Filled
 from usdhand.fill.settings import FillSettings
-from usdhand.formats.files import read_clip, reopened
+from usdhand.formats.files import read_clip
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.output import check_output
+from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.formats.usd.add_joints import author_joints, joint_count
 from usdhand.formats.usd.library import is_library, read_library
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
@@ -87,21 +87,17 @@ def write_filled(
     Joints that the body has beyond its file (`add_finger_joints`) are added to its Skeleton.
     """
     best = filled.clips[0]
-    character = reopened(best)
-    added = range(joint_count(character), len(best.skeleton))
-    changed = sorted({*filled.changed, *added})
     digits = len(str(len(filled.clips)))  # so that editors sort them
     variants = {f"choice_{i:0{digits}}": clip for i, clip in enumerate(filled.clips, 1)}
     return write_motion(
-        character,
+        character_under(best),
         best,
-        changed,
+        filled.changed,
         Path(output),
         flatten=flatten,
         force=force,
         inputs=inputs,
         variants=variants if len(variants) > 1 else None,
-        author=lambda layer, _: author_joints(layer, character, best.skeleton),
     )
 
 
@@ -162,6 +158,13 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
 
 def _read_body(request: FillRequest) -> Clip:
     body = request.body
-    if body.suffix.lower() in USD_SUFFIXES and is_library(body):
-        raise UsageError(f"{body} is a motion library; give the clip to be filled, then --library.")
-    return read_clip(body, request.skel)
+    refusal = f"{body} is a motion library; give the clip to be filled, then --library."
+    try:
+        clip = read_clip(body, request.skel)
+    except UsdHandError as error:
+        if is_library(body):
+            raise UsageError(refusal) from error
+        raise
+    if is_library(clip):
+        raise UsageError(refusal)
+    return clip

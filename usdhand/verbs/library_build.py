@@ -38,8 +38,6 @@ def run(request: LibraryBuildRequest, journal: Journal) -> Outcome:
     output = request.output
     paths = [p for p in find_files_below(request.clips) if not _same(p, output)]
     check_output(output, paths, True, OUTPUTS)
-    if output.exists() and not is_library(output):
-        raise OutputError(f"{output} exists and is no motion library; give another name.")
     previous = _previous(request, journal)
     labels = _read_labels(request.labels) if request.labels else None
     try:
@@ -109,6 +107,9 @@ def _previous(request: LibraryBuildRequest, journal: Journal) -> MotionLibrary |
     try:
         return read_library(request.output)
     except InputError as error:
+        if not is_library(request.output):
+            message = f"{request.output} exists and is no motion library; give another name."
+            raise OutputError(message) from error
         if not request.rebuild:
             raise
         journal.warn("lost-labels", f"labels and actors of the old library are lost: {error}")

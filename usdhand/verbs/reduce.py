@@ -10,8 +10,9 @@ import numpy as np
 
 from usdhand.anatomy import SIDES, Side
 from usdhand.errors import OutputError, UsageError
-from usdhand.formats.files import read_clip, reopened
+from usdhand.formats.files import read_clip
 from usdhand.formats.output import check_folder, check_outputs, make_folder
+from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.motion import Clip, Problem
@@ -89,9 +90,8 @@ def write_rig(
 
     Returns what one file, if it was to be one, could not keep.
     """
-    return usd_rig.write_rig(
-        reduction, reopened(reduction.clip), Path(output), flatten=flatten, force=force
-    )
+    character = character_under(reduction.clip, animated=True)
+    return usd_rig.write_rig(reduction, character, Path(output), flatten=flatten, force=force)
 
 
 def _same_skeleton(a: Clip, b: Clip) -> bool:

@@ -11,9 +11,11 @@ import numpy as np
 
 from usdhand.anatomy import SIDES, Side
 from usdhand.errors import UsageError, UsdHandError
-from usdhand.formats.files import read_clip, reopened
+from usdhand.formats.files import read_clip
 from usdhand.formats.output import check_output
+from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.warp import author_warps
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip, Problem
@@ -105,8 +107,8 @@ def write_spliced(
 
     The wrists are written too where they are the hand clip's.
     """
-    clip = spliced.clip
-    character = reopened(clip)
+    character = character_under(spliced.clip)
+    clip = as_on_stage(spliced.clip, character)
     hands = find_hands(clip, conventions, list(spliced.hands))
     changed = [j for frames in hands.frames.values() for j in frames.links.moving]
     if spliced.settings.wrist == "hands":

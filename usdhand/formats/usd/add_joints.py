@@ -14,9 +14,9 @@ from usdhand.motion import Skeleton
 from usdhand.motion.rotations import Array
 
 
-def joint_count(character: Character) -> int:
-    """Number of joints that a character's Skeleton has in its file."""
-    return len(UsdSkel.Skeleton(character.skeleton).GetJointsAttr().Get() or ())
+def joint_tokens(character: Character) -> tuple[str, ...]:
+    """Joints of a character's Skeleton on its stage."""
+    return tuple(str(j) for j in UsdSkel.Skeleton(character.skeleton).GetJointsAttr().Get() or ())
 
 
 def author_joints(layer: Sdf.Layer, character: Character, skeleton: Skeleton) -> None:
@@ -26,10 +26,8 @@ def author_joints(layer: Sdf.Layer, character: Character, skeleton: Skeleton) ->
     matrices to the bit.
     """
     prim = UsdSkel.Skeleton(character.skeleton)
-    own = [str(joint) for joint in prim.GetJointsAttr().Get()]
+    own = joint_tokens(character)
     more = range(len(own), len(skeleton))
-    if skeleton.joints[: len(own)] != tuple(own):
-        raise AssertionError("joints are added behind those of the file")
     if not more:
         return
     world = world_above(character.skeleton)

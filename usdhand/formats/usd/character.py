@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
+from usdhand.errors import InputError
+from usdhand.formats.usd.add_joints import joint_tokens
 from usdhand.formats.usd.animation import author_animation
 from usdhand.formats.usd.names import author_names, legal_name, legal_skeleton
-from usdhand.formats.usd.stage import Character
+from usdhand.formats.usd.stage import Character, compose
 from usdhand.motion import Clip, Skeleton
+from usdhand.motion.editing import counted_in_frames
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
 from usdhand.motion.transforms import affine
 
@@ -29,14 +33,39 @@ def legal_clip(clip: Clip) -> Clip:
     return replace(clip, skeleton=legal_skeleton(clip.skeleton))
 
 
+def as_on_stage(clip: Clip, character: Character) -> Clip:
+    """Return a clip with its joints named, and its time counted, as on a character's stage.
+
+    It may have more joints, behind those of the character.
+
+    Raises
+    ------
+    InputError
+        if its joints are others.
+    """
+    own = joint_tokens(character)
+    for skeleton in (clip.skeleton, legal_skeleton(clip.skeleton)):
+        if skeleton.joints[: len(own)] == own:
+            named = replace(clip, skeleton=skeleton)
+            return _counted(named, character.stage.GetTimeCodesPerSecond())
+    raise InputError(
+        f"{character.path}: the clip '{clip.name}' does not have the joints of "
+        f"{character.skeleton.GetPath()}, which it is to be written over. Without a source "
+        "(dataclasses.replace(clip, source=None)) it is written as a character of its own."
+    )
+
+
 def character_of(clip: Clip, *, up: str = "Y", animated: bool = True) -> Character:
     """Return a stage in memory with a clip's character on it: centimetres, the clip's time codes.
 
     A SkelRoot as default prim, below it a Skeleton with bind and rest transforms, and, if the clip
     is ``animated``, a SkelAnimation with rotations, translations and scales of all joints.
     """
+    origin = clip.origin
+    if not math.isclose(origin.time_codes_per_frame * clip.fps, origin.time_codes_per_second):
+        clip = counted_in_frames(clip)  # made in memory, with nothing said of time codes
     layer = Sdf.Layer.CreateAnonymous(".usdc")
-    stage = Usd.Stage.Open(layer)
+    stage = compose(layer)
     root = Sdf.Path.absoluteRootPath.AppendChild(legal_name(clip.name or "Character"))
     _describe(stage, clip, up, animated)
     prim = UsdSkel.Root.Define(stage, root).GetPrim()
@@ -56,6 +85,22 @@ def character_of(clip: Clip, *, up: str = "Y", animated: bool = True) -> Charact
 def gf_matrices(matrices: Array) -> Vt.Matrix4dArray:
     """USD's row-vector matrices of (n, 4, 4) column-vector ones."""
     return Vt.Matrix4dArray([Gf.Matrix4d(m.T.tolist()) for m in matrices])
+
+
+def _counted(clip: Clip, per_second: float) -> Clip:
+    """Return a clip whose time codes count so many a second."""
+    origin, step = clip.origin, per_second / clip.fps
+    if origin.time_codes_per_second == per_second and math.isclose(
+        origin.time_codes_per_frame, step
+    ):
+        return clip
+    origin = replace(
+        origin,
+        time_codes_per_second=per_second,
+        first_time_code=clip.start * per_second,
+        time_codes_per_frame=step,
+    )
+    return replace(clip, origin=origin)
 
 
 def _describe(stage: Usd.Stage, clip: Clip, up: str, animated: bool) -> None:

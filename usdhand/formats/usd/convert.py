@@ -11,10 +11,10 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.animation import author_animation
-from usdhand.formats.usd.character import gf_matrices
+from usdhand.formats.usd.character import character_of, gf_matrices, legal_clip
 from usdhand.formats.usd.names import author_names, legal_skeleton
-from usdhand.formats.usd.poses import authored_poses
-from usdhand.formats.usd.stage import Character, bound_animation, find_skeletons
+from usdhand.formats.usd.poses import AuthoredPoses, authored_poses
+from usdhand.formats.usd.stage import Character, bound_animation, compose, find_skeletons
 from usdhand.formats.usd.world import world_above
 from usdhand.formats.usd.write import (
     bind_animation,
@@ -24,10 +24,11 @@ from usdhand.formats.usd.write import (
     free_child,
     instances_above,
     layer_over,
+    save_flat,
     save_layer,
     stage_files,
 )
-from usdhand.motion import Clip, Problem
+from usdhand.motion import Clip, Problem, Skeleton
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import recounted_code
 from usdhand.motion.transforms import local_matrices
@@ -61,9 +62,7 @@ def placed(character: Character, placement: StageEdit) -> Character:
     the skeleton.
     """
     source = character.stage
-    layer = layer_over(source, character.path)
-    layer.subLayerPaths.clear()
-    layer.subLayerPaths.append(source.GetRootLayer().realPath)
+    layer = layer_over(source)
     layer.subLayerOffsets[0] = Sdf.LayerOffset(placement.offset)
     old, new = source.GetTimeCodesPerSecond(), placement.per_second
     if new is not None:
@@ -72,7 +71,7 @@ def placed(character: Character, placement: StageEdit) -> Character:
         if source.HasAuthoredMetadata(field):
             moved = recounted_code(source.GetMetadata(field), old, new or old) + placement.offset
             layer.pseudoRoot.SetInfo(field, moved)
-    stage = Usd.Stage.Open(layer)
+    stage = compose(layer)
     _turn_and_scale(stage, placement)
     skeleton = stage.GetPrimAtPath(character.skeleton.GetPath())
     return replace(character, stage=stage, skeleton=skeleton, animation=bound_animation(skeleton))
@@ -87,10 +86,11 @@ def write_placed(
     force: bool = False,
     inputs: Sequence[Path] = (),
 ) -> tuple[Problem, ...]:
-    """Write one file with all of a character's stage, its motion being ``clip`` if ``edited``.
+    """Write one file with all of a `placed` character's stage, the motion ``clip`` if ``edited``.
 
-    Joint names become legal and poses that are missing are written. The stage's own motion is kept
-    as it is where it is whole, with all of its variants.
+    The stage, which is in memory, shows the result afterwards. Joint names become legal and poses
+    that are missing are written. The stage's own motion is kept as it is where it is whole, with
+    all of its variants.
 
     Returns
     -------
@@ -106,7 +106,8 @@ def write_placed(
     check_output(
         output, [character.path, *stage_files(character.stage), *inputs], force, USD_SUFFIXES
     )
-    layer = layer_over(character.stage, output)
+    stage = character.stage
+    layer = layer_over(stage)
     with Sdf.ChangeBlock():
         for path in instances_above(character):
             Sdf.CreatePrimInLayer(layer, path).SetInfo("instanceable", False)
@@ -117,29 +118,51 @@ def write_placed(
         with Sdf.ChangeBlock():
             _author_motion(layer, character, clip, changed, variants)
         lost = tuple(_one_motion(*place) for place in variants)
-    _mend_skeleton(layer, character, clip)
-    return (*lost, *save_layer(layer, output, flatten=True))
+    poses, _ = authored_poses(character, len(clip.skeleton), 1.0)
+    local = _local_in_file(character, clip)
+    stage.GetRootLayer().TransferContent(layer)
+    _mend_skeleton(stage.GetPrimAtPath(character.skeleton.GetPath()), clip.skeleton, poses, local)
+    return (*lost, *save_flat(stage, output))
+
+
+def write_made(
+    clip: Clip, output: Path, *, up: str = "Y", animated: bool = True
+) -> tuple[Problem, ...]:
+    """Write a clip as a file with a complete character and nothing else; see `character_of`.
+
+    Returns what USD said of the package, if it is one. Raises OutputError if it cannot be written.
+    """
+    stage = character_of(legal_clip(clip), up=up, animated=animated).stage
+    if output.suffix.lower() == ".usdz":
+        return save_flat(stage, output)
+    return save_layer(stage.GetRootLayer(), output, flatten=False)
 
 
 def motion_variants(character: Character) -> list[tuple[Sdf.Path, str, str]]:
     """Prims, variant sets and selections on which a character's motion depends."""
-    stage = Usd.Stage.Open(character.stage.GetRootLayer())  # with a session layer of its own
-    stage.SetEditTarget(stage.GetSessionLayer())
     own = character.skeleton.GetPath()
     paths = set(own.GetPrefixes())
     if character.animation is not None:
         paths |= set(character.animation.GetPath().GetPrefixes())
+    places = [
+        (path, name)
+        for path in sorted(paths)
+        for name in character.stage.GetPrimAtPath(path).GetVariantSets().GetNames()
+    ]
+    if not places:
+        return []
+    stage = compose(character.stage.GetRootLayer())  # with a session layer of its own
+    stage.SetEditTarget(stage.GetSessionLayer())
     found = []
-    for path in sorted(paths):
+    for path, name in places:
         sets = stage.GetPrimAtPath(path).GetVariantSets()
-        for name in sets.GetNames():
-            selected, selection = _opinions(stage, own), sets.GetVariantSelection(name)
-            for other in sets.GetVariantSet(name).GetVariantNames():
-                sets.SetSelection(name, other)
-                if _opinions(stage, own) != selected:
-                    found.append((path, name, selection))
-                    break
-            stage.GetSessionLayer().Clear()
+        selected, selection = _opinions(stage, own), sets.GetVariantSelection(name)
+        for other in sets.GetVariantSet(name).GetVariantNames():
+            sets.SetSelection(name, other)
+            if _opinions(stage, own) != selected:
+                found.append((path, name, selection))
+                break
+        stage.GetSessionLayer().Clear()
     return found
 
 
@@ -212,24 +235,21 @@ def _author_motion(
     extend_time(layer, times)
 
 
-def _mend_skeleton(layer: Sdf.Layer, character: Character, clip: Clip) -> None:
-    """Write what the skeleton lacks: legal names, bind and rest pose, the binding schema."""
-    stage = Usd.Stage.Open(layer)
-    prim = stage.GetPrimAtPath(character.skeleton.GetPath())
-    skeleton, count = UsdSkel.Skeleton(prim), len(clip.skeleton)
-    legal = legal_skeleton(clip.skeleton)
-    pairs = zip(clip.skeleton.joints, legal.joints, strict=True)
+def _mend_skeleton(prim: Usd.Prim, own: Skeleton, poses: AuthoredPoses, local: Array) -> None:
+    """Write what a skeleton lacks: legal names, bind and rest pose, the binding schema.
+
+    ``local`` (joints, 4, 4) are the joint-to-parent matrices that stand in for poses.
+    """
+    skeleton, legal = UsdSkel.Skeleton(prim), legal_skeleton(own)
+    pairs = zip(own.joints, legal.joints, strict=True)
     if renamed := {a: b for a, b in pairs if a != b}:
         skeleton.GetJointsAttr().Set(Vt.TokenArray(list(legal.joints)))
         author_names(prim, legal)
-        _rename(stage, renamed)
-    poses, _ = authored_poses(character, count, 1.0)
-    if poses.bind is None or poses.rest is None:
-        local = _local_in_file(character, clip)
-        if poses.rest is None:
-            skeleton.CreateRestTransformsAttr(gf_matrices(local))
-        if poses.bind is None:
-            skeleton.CreateBindTransformsAttr(gf_matrices(clip.skeleton.accumulated(local)))
+        _rename(prim.GetStage(), renamed)
+    if poses.rest is None:
+        skeleton.CreateRestTransformsAttr(gf_matrices(local))
+    if poses.bind is None:
+        skeleton.CreateBindTransformsAttr(gf_matrices(own.accumulated(local)))
     if not prim.HasAPI(UsdSkel.BindingAPI):
         UsdSkel.BindingAPI.Apply(prim)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
-from usdhand.formats.usd.stage import usd_diagnostics
+from usdhand.formats.usd.stage import compose, usd_diagnostics
 from usdhand.motion import Problem
 
 EMBEDDED = "usdhand:embedded"  # in the custom data of a class: the file that it is a copy of
@@ -124,7 +124,7 @@ class _Embedding:
 
     def _embed(self, asset: str) -> bool:
         try:
-            stage = Usd.Stage.Open(asset, Usd.Stage.LoadNone)
+            stage = compose(asset, Usd.Stage.LoadNone)
         except Tf.ErrorException:
             return False
         layer = _layer_stack(stage)
@@ -149,7 +149,7 @@ class _Embedding:
         """Delete targets outside of what is referenced: valid in one file, not between files."""
         roots = [root for root, _, _ in self.classes.values()]
         strays: list[tuple[Usd.Property, list[Sdf.Path]]] = []
-        stage = Usd.Stage.Open(self.layer)
+        stage = compose(self.layer)
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
             for prop in prim.GetAuthoredProperties():
                 related = isinstance(prop, Usd.Relationship)

@@ -6,7 +6,6 @@ can move), what is said of it, and packed arrays of what search and assembly nee
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -28,10 +27,12 @@ from usdhand.fill.library import (
     unpack_arm,
 )
 from usdhand.fill.settings import Segmentation
+from usdhand.formats import paths
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.formats.usd.stage import open_stage, usd_diagnostics
+from usdhand.formats.usd.stage import Character, compose, open_stage, usd_diagnostics
 from usdhand.formats.usd.write import save_layer
+from usdhand.motion import Clip
 from usdhand.problems import Problem
 
 VERSION = 1
@@ -81,12 +82,17 @@ def write_library(library: MotionLibrary, output: Path, *, force: bool = False) 
     save_layer(layer, output, flatten=False)
 
 
-def is_library(path: Path) -> bool:
-    """Whether a file is a motion library, of any version."""
+def is_library(file: Path | Clip) -> bool:
+    """Whether a file, or the one that a clip was read from, is a motion library of any version."""
+    if isinstance(file, Clip):
+        return isinstance(file.source, Character) and _holds_library(file.source.stage)
     try:
-        stage = _open(path)
+        return _holds_library(_open(file))
     except UsdHandError:
         return False
+
+
+def _holds_library(stage: Usd.Stage) -> bool:
     root = stage.GetPrimAtPath(ROOT)
     return bool(root) and root.GetAttribute("usdhand:libraryVersion").HasValue()
 
@@ -149,7 +155,7 @@ def _open(path: Path) -> Usd.Stage:
     if path.is_file() and path.suffix.lower() in USD_SUFFIXES:
         with usd_diagnostics():
             try:
-                stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
+                stage = compose(str(path), Usd.Stage.LoadNone)
             except Tf.ErrorException:
                 stage = None
     if stage is None:
@@ -169,10 +175,7 @@ def _segmentation(root: Usd.Prim, path: Path) -> Segmentation:
 
 def relative_path(path: Path, library: Path) -> str:
     """How a library in ``library``'s folder refers to a clip."""
-    try:
-        return Path(os.path.relpath(path, library.absolute().parent)).as_posix()
-    except ValueError:  # another drive
-        return path.absolute().as_posix()
+    return paths.relative_path(path, library.absolute().parent) or path.absolute().as_posix()
 
 
 def _set_time(layer: Sdf.Layer, library: MotionLibrary) -> None:

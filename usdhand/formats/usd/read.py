@@ -117,7 +117,8 @@ def _animated_clip(character: Character) -> Clip:
             f"{character.path}: {timing.fps:g} frames a second cannot be meant; check "
             f"timeCodesPerSecond ({origin.time_codes_per_second:g})."
         )
-    return Clip(skeleton, q, t, scales, timing.fps, character.path.stem, origin, problems)
+    name = character.path.stem
+    return Clip(skeleton, q, t, scales, timing.fps, name, origin, problems, character)
 
 
 def _still_clip(character: Character) -> Clip:
@@ -140,7 +141,8 @@ def _still_clip(character: Character) -> Clip:
     )
     origin = _origin(character, world)
     fps = origin.time_codes_per_second
-    return Clip(skeleton, q, t, np.ones_like(t), fps, character.path.stem, origin, problems)
+    scales = np.ones_like(t)
+    return Clip(skeleton, q, t, scales, fps, character.path.stem, origin, problems, character)
 
 
 def _targets(

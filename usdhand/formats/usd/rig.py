@@ -14,12 +14,13 @@ from usdhand.anatomy.channels import Channels, Hands
 from usdhand.anatomy.frames import HandFrames
 from usdhand.anatomy.hand import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError
+from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, VERSION, author_rig
 from usdhand.formats.usd.stage import (
     Character,
+    bound_animation,
     damage_refused,
-    find_character,
     open_stage,
 )
 from usdhand.formats.usd.write import free_child, write_motion
@@ -82,6 +83,7 @@ def write_rig(
     Returns what one file, if it was to be one, could not keep. Raises the errors of `write_motion`.
     """
     frames = reduction.hands.frames.values()
+    reduction = replace(reduction, clip=as_on_stage(reduction.clip, character))
     stage, skeleton = character.stage, character.skeleton.GetPath()
     old = [p.GetPath() for p in rig_prims(stage) if _skeleton_path(p) in (str(skeleton), None)]
 
@@ -114,6 +116,11 @@ def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
     """
     path = Path(path)
     stage, _ = open_stage(path)
+    return read_rig_on(stage, path, skel)
+
+
+def read_rig_on(stage: Usd.Stage, path: Path, skel: str | None = None) -> ReducedRig:
+    """Read the relations of a rig on a stage that was opened from ``path``; see `read_rig`."""
     with damage_refused(path):
         return _relations(find_rig(stage, path, skel), path)
 
@@ -121,14 +128,15 @@ def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
 def read_stored_rig(path: str | Path, skel: str | None = None) -> StoredRig:
     """Read a rig file with the curves of its free channels and its character; see `read_rig`."""
     path = Path(path)
-    stage, _ = open_stage(path)
+    stage, problems = open_stage(path)
     with damage_refused(path):
         prim = find_rig(stage, path, skel)
         rig = _relations(prim, path)
-        skeleton = _skeleton_path(prim)
-        if skeleton is None:
+        found = _skeleton_path(prim)
+        if found is None:
             raise InputError(f"{path}: the skeleton of the rig {prim.GetPath()} is not there.")
-        character = find_character(path, skeleton)
+        skeleton = stage.GetPrimAtPath(found)
+        character = Character(stage, path, skeleton, bound_animation(skeleton), problems)
         clip = clip_from_character(character)
         curves = [_curve(prim, name, clip.time_codes, path) for name in rig.free]
         values = np.stack(curves, axis=1) if curves else np.empty((len(clip), 0))

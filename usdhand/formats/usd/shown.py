@@ -12,7 +12,7 @@ from pxr import Usd
 from usdhand.anatomy.hand import SIDES, Side
 from usdhand.formats.usd.animation import VARIANT_SET
 from usdhand.formats.usd.read import bind_pose_clip, clip_from_character
-from usdhand.formats.usd.rig import read_rig, rig_prims
+from usdhand.formats.usd.rig import read_rig_on, rig_prims
 from usdhand.formats.usd.skins import Skin, read_skins
 from usdhand.formats.usd.stage import Character, find_character
 from usdhand.formats.usd.warp import SCOPE_NAME
@@ -47,7 +47,8 @@ def read_shown(
 ) -> list[ShownMotion]:
     """Read a file's motion, every alternative of `fill` on its own, the selected one first.
 
-    A character without motion is one frame of its bind pose.
+    A character without motion is one frame of its bind pose. The clips have no source, since the
+    stage shows another variant afterwards.
 
     Raises the same errors as `usdhand.formats.usd.read.read_character`.
     """
@@ -56,6 +57,7 @@ def read_shown(
         clips = {"": bind_pose_clip(character)}
     else:
         clips = {name: clip_from_character(c) for name, c in _alternatives(character)}
+    clips = {name: replace(clip, source=None) for name, clip in clips.items()}
     rig = _rig(character)
     surfaces, notes = read_skins(character) if skins else ((), ())
     return [
@@ -93,4 +95,4 @@ def _warps(character: Character, clip: Clip) -> dict[Side, Array]:
 def _rig(character: Character) -> ReducedRig | None:
     if next(rig_prims(character.stage), None) is None:
         return None
-    return read_rig(character.path, str(character.skeleton.GetPath()))
+    return read_rig_on(character.stage, character.path, str(character.skeleton.GetPath()))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from pickle import PicklingError
 from typing import Any
 
 from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
@@ -20,7 +21,11 @@ MOST_NAMED = 8  # skeletons in a message
 
 @dataclass(frozen=True, eq=False)
 class Character:
-    """A skeleton on a stage with the animation bound to it, if any."""
+    """A skeleton on a stage with the animation bound to it, if any.
+
+    Copies share the stage. Stages do not go from process to process: pickled, it becomes a
+    `ClosedCharacter`.
+    """
 
     stage: Usd.Stage
     path: Path
@@ -36,6 +41,26 @@ class Character:
             return root.GetPrim()
         parent = self.skeleton.GetParent()
         return self.skeleton if parent.IsPseudoRoot() else parent
+
+    def __deepcopy__(self, _: object) -> Character:
+        return self
+
+    def __reduce__(self) -> tuple[type[ClosedCharacter], tuple[Path, str]]:
+        if self.stage.GetRootLayer().anonymous:
+            raise PicklingError(f"{self.path}: a character on a stage in memory cannot be pickled.")
+        return ClosedCharacter, (self.path.absolute(), str(self.skeleton.GetPath()))
+
+
+@dataclass(frozen=True)
+class ClosedCharacter:
+    """Where a character is to be found again in another process."""
+
+    path: Path
+    skeleton: str
+
+    def opened(self) -> Character:
+        """Open its stage; raises the errors of `find_character`."""
+        return find_character(self.path, self.skeleton)
 
 
 @contextmanager
@@ -69,6 +94,17 @@ def damage_refused(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: the file is damaged, values cannot be read.") from error
 
 
+def compose(root: str | Sdf.Layer, load: Usd.Stage.InitialLoadSet = Usd.Stage.LoadAll) -> Usd.Stage:
+    """Compose a file or layer as a stage. All stages come from here, so that they can be counted.
+
+    Raises
+    ------
+    Tf.ErrorException
+        if it cannot be opened.
+    """
+    return Usd.Stage.Open(root, load)
+
+
 def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     """Open a stage; what could not be composed comes back as problems.
 
@@ -90,7 +126,7 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     stage = None
     with usd_diagnostics() as messages:
         try:
-            stage = Usd.Stage.Open(str(path))
+            stage = compose(str(path))
         except Tf.ErrorException as error:
             messages += [_sentence(e) for e in error.args]
     if stage is None:

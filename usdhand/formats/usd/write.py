@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,12 +13,16 @@ from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
 from usdhand.errors import InputError, OutputError, UsdHandError
 from usdhand.formats.output import check_output, written_beside
+from usdhand.formats.paths import relative_path
 from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.formats.usd.add_joints import author_joints, joint_tokens
 from usdhand.formats.usd.animation import author_animation, author_variants
+from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.flatten import flat_layer
 from usdhand.formats.usd.stage import (
     Character,
     binding_prim,
+    compose,
     find_skeletons,
     is_text,
     open_stage,
@@ -65,6 +68,8 @@ def write_motion(
 ) -> tuple[Problem, ...]:
     """Write a character with new motion as a layer over its input.
 
+    Joints that the clip has beyond the character's are added to its Skeleton.
+
     Parameters
     ----------
     changed : joints whose motion differs from the input's; all others are kept to the bit
@@ -77,28 +82,37 @@ def write_motion(
     Returns
     -------
     tuple of Problem
-        what flattening could not keep, and where files are that were inside packages.
+        what flattening could not keep, where files are that were inside packages, and whether the
+        layer refers to its input by an absolute path.
 
     Raises
     ------
+    InputError
+        if the clip is of another skeleton, or has rotations that are no numbers.
     OutputError
         if the output is refused or cannot be written; nothing is left behind then.
     """
     check_name(output)
     check_output(output, [*stage_files(character.stage), *inputs], force, USD_SUFFIXES)
-    for motion in (clip, *(variants or {}).values()):
+    clips = {
+        name: as_on_stage(motion, character) for name, motion in (variants or {"": clip}).items()
+    }
+    for motion in clips.values():
         if not np.isfinite(motion.rotations).all():
             raise InputError(f"{character.path}: the result has rotations that are no numbers.")
-    layer = layer_over(character.stage, output)
+    skeleton = next(iter(clips.values())).skeleton
+    changed = sorted({*changed, *range(len(joint_tokens(character)), len(skeleton))})
+    layer = layer_over(character.stage)
     with Sdf.ChangeBlock():
         for path in instances_above(character):
             Sdf.CreatePrimInLayer(layer, path).SetInfo("instanceable", False)
+        author_joints(layer, character, skeleton)
         root = character.root.GetPath()
         animation = free_child(character.stage, root, ANIMATION_NAME)
         if variants:
-            times = author_variants(layer, animation, character, variants, changed)
+            times = author_variants(layer, animation, character, clips, changed)
         else:
-            times = author_animation(layer, animation, character, clip, changed)
+            times = author_animation(layer, animation, character, clips[""], changed)
         if character.animation is not None:
             copy_blend_shapes(layer, animation, UsdSkel.Animation(character.animation))
         bind_animation(layer, character, animation)
@@ -111,25 +125,45 @@ def write_motion(
 def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> tuple[Problem, ...]:
     """Save a layer to ``output``: written beside, opened once to see that it holds, then moved.
 
-    Returns what flattening could not keep, and where files are that were inside packages.
+    Its sublayers are given as absolute paths; what is not flattened gets relative ones.
+
+    Returns what flattening could not keep, where files are that were inside packages, and which
+    absolute paths had to stay.
     """
+    if flatten or output.suffix.lower() == ".usdz":
+        with usd_diagnostics():
+            stage = compose(layer)
+        return save_flat(stage, output)
     check_name(output)
-    problems: tuple[Problem, ...] = ()
+    problems = _make_relative(layer, output)
+    with written_beside(output) as temporary:
+        _export(layer, temporary)
+        _verify(temporary)
+    _reload(output)
+    return problems
+
+
+def save_flat(stage: Usd.Stage, output: Path) -> tuple[Problem, ...]:
+    """Save all of a stage as one file, or package; see `save_layer`."""
+    check_name(output)
+    flat, problems = flat_layer(stage)
     with ExitStack() as undone, written_beside(output) as temporary:
         if output.suffix.lower() == ".usdz":
-            problems = _package(layer, temporary, output)
-        elif flatten:
-            flat, problems = _flattened(layer, output)
-            problems += undone.enter_context(unpacked_beside(flat, output))
-            _make_relative(flat, output)
-            _export(flat, temporary)
+            problems += _package(flat, temporary, output)
         else:
-            _export(layer, temporary)
+            problems += undone.enter_context(unpacked_beside(flat, output))
+            problems += _make_all_relative(flat, output)
+            _export(flat, temporary)
         _verify(temporary)
+    _reload(output)
+    return problems
+
+
+def _reload(output: Path) -> None:
+    """Let stages of this process that show the file show what it is now."""
     loaded = Sdf.Layer.Find(str(output.absolute()))
     if loaded:
         loaded.Reload(force=True)
-    return problems
 
 
 def check_name(output: Path) -> None:
@@ -144,35 +178,47 @@ def check_name(output: Path) -> None:
         raise OutputError(f"{readable(output)}: this name is no valid text (UTF-8); USD needs one.")
 
 
-def _flattened(layer: Sdf.Layer, output: Path) -> tuple[Sdf.Layer, tuple[Problem, ...]]:
-    """Return one layer for all that ``layer`` is over, and what it cannot keep."""
-    beside = output.with_name(f".{output.stem}.{os.getpid()}.layer.usdc")
-    try:
-        _export(layer, beside)
-        return flat_layer(Usd.Stage.Open(str(beside)))
-    finally:
-        beside.unlink(missing_ok=True)
+def _make_relative(layer: Sdf.Layer, output: Path) -> tuple[Problem, ...]:
+    """Give the sublayers of a layer paths as seen from ``output``; say which stay absolute.
 
-
-def _make_relative(flat: Sdf.Layer, output: Path) -> None:
-    """Give a layer paths as seen from ``output``.
-
-    Flattening makes all paths absolute, and files that move together would lose each other.
+    Files that move together would lose each other by absolute paths.
     """
-    modify_paths(
-        flat, lambda asset: _relative(Path(asset), output) if Path(asset).is_absolute() else asset
+    paths = {path: _relative(Path(path), output) for path in layer.subLayerPaths}
+    layer.subLayerPaths[:] = list(paths.values())
+    return _absolute(paths.values(), output)
+
+
+def _make_all_relative(flat: Sdf.Layer, output: Path) -> tuple[Problem, ...]:
+    """Do so with all paths of a layer, which flattening makes absolute."""
+    paths: dict[str, str] = {}
+
+    def relative(asset: str) -> str:
+        if not Path(asset).is_absolute():
+            return asset
+        return paths.setdefault(asset, _relative(Path(asset), output))
+
+    modify_paths(flat, relative)
+    return _absolute(paths.values(), output)
+
+
+def _absolute(paths: Iterable[str], output: Path) -> tuple[Problem, ...]:
+    why = (
+        "is referred to by its absolute path, since no relative one leads to it from both "
+        f"{output.absolute().parent} and {output.parent.resolve()}"
+    )
+    return tuple(
+        Problem("absolute-path", f"{path} {why}") for path in paths if Path(path).is_absolute()
     )
 
 
-def _package(layer: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, ...]:
-    flat, problems = _flattened(layer, output)
+def _package(flat: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, ...]:
     with TemporaryDirectory(prefix=f".{output.stem}.", dir=output.absolute().parent) as folder:
         # USD packs UDIM tiles only where they are below the layer, and packages as a whole.
         copies = copies_of(flat, lambda asset: is_udim(asset) or is_packed(asset))
         copy_files(flat, copies, Path(folder, "textures"))
         path = Path(folder, "flat.usdc")
         missing = missing_files(flat)
-        _make_relative(flat, path)
+        _make_all_relative(flat, path)
         _export(flat, path)
         name = f"{output.stem}.usdc"
         with usd_diagnostics() as messages:
@@ -180,7 +226,7 @@ def _package(layer: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, 
         if not done:
             reason = f"; not found: {', '.join(missing)}" if missing else ""
             raise OutputError(f"{output}: USD could not make the .usdz package{reason}.")
-    return (*problems, *(Problem("usd", message) for message in messages))
+    return tuple(Problem("usd", message) for message in messages)
 
 
 def stage_files(stage: Usd.Stage) -> list[Path]:
@@ -205,15 +251,16 @@ def _verify(path: Path) -> None:
         raise OutputError(f"What was written cannot be read back: {error}") from error
     layer = stage.GetRootLayer()
     for asset in layer.subLayerPaths:
-        if not Sdf.Layer.FindOrOpenRelativeToLayer(layer, asset):
+        if not Sdf.Layer.FindRelativeToLayer(layer, asset):  # the stage has opened it
             raise OutputError(f"{asset} cannot be found from {path.parent}.")
 
 
-def layer_over(stage: Usd.Stage, output: Path) -> Sdf.Layer:
+def layer_over(stage: Usd.Stage) -> Sdf.Layer:
     """Return a layer over a stage that says the same about units, axes and time.
 
-    A root layer without ``timeCodesPerSecond`` would silently rescale time to 24. What is on a
-    stage in memory is copied, since there is no file to be over.
+    It refers to the stage's file by an absolute path until it is saved. A root layer without
+    ``timeCodesPerSecond`` would silently rescale time to 24. What is on a stage in memory is
+    copied, since there is no file to be over.
     """
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     source = stage.GetRootLayer()
@@ -230,14 +277,13 @@ def layer_over(stage: Usd.Stage, output: Path) -> Sdf.Layer:
             layer.pseudoRoot.SetInfo(field, stage.GetMetadata(field))
     if stage.GetDefaultPrim():
         layer.defaultPrim = stage.GetDefaultPrim().GetName()
-    layer.subLayerPaths.append(_relative(Path(source.realPath), output))
+    layer.subLayerPaths.append(source.realPath)
     return layer
 
 
 def _relative(path: Path, output: Path) -> str:
-    try:
-        relative = Path(os.path.relpath(path, output.absolute().parent)).as_posix()
-    except ValueError:  # another drive
+    relative = relative_path(path, output.absolute().parent)
+    if relative is None:
         return path.as_posix()
     return relative if relative.startswith("..") else f"./{relative}"
 

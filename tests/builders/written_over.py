@@ -1,0 +1,94 @@
+"""What each verb makes of a clip, and judging in world space what it has written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders.every_format import talk
+from conftest import REPOSITORY
+from oracles.usdskel import joint_worlds
+
+from usdhand import verbs as api
+from usdhand.fill.library import MotionLibrary
+from usdhand.motion import Clip, Origin, forward_kinematics
+from usdhand.motion import rotations as rot
+
+VERBS = ("reduce", "expand", "fill", "splice", "write_clip")
+NEAR_CM, NEAR_DEG = 1e-3, 1e-3  # a hundredth of a millimetre
+
+
+def small_library(folder: Path) -> MotionLibrary:
+    clips = sorted((REPOSITORY / "samples" / "gestures").glob("*.usdc"))[::7]
+    return api.build_library(clips, folder / "library.usdc").library
+
+
+@dataclass
+class Result:
+    """A clip as a verb made it, and how it is written."""
+
+    clip: Clip
+    write: Callable[..., object]
+
+
+def channels_scaled(clip: Clip, factor: float) -> Clip:
+    hands = api.find_hands(clip)
+    channels = hands.encode(clip)
+    return hands.decode(channels.replaced(replace(channels, values=factor * channels.values)), clip)
+
+
+def result_of(verb: str, clip: Clip, library: MotionLibrary, folder: Path) -> Result:
+    if verb == "write_clip":
+        made = channels_scaled(clip, 0.5)
+        return Result(made, lambda output, **options: api.write_clip(made, output, **options))
+    if verb == "fill":
+        filled = api.fill_fingers(clip, library, replace_motion=True)
+        assert filled.changed
+        return Result(filled.clips[0], lambda o, **options: api.write_filled(filled, o, **options))
+    if verb == "splice":
+        spliced = api.splice_hands(clip, talk())
+        return Result(spliced.clip, lambda o, **options: api.write_spliced(spliced, o, **options))
+    [reduction] = api.reduce_hands([clip])
+    if verb == "reduce":
+        return Result(reduction.motion, lambda o, **more: api.write_rig(reduction, o, **more))
+    rig = folder / "expanded.rig.usdc"
+    api.write_rig(reduction, rig, force=True)
+    expanded = api.expand(rig)
+    return Result(expanded, lambda output, **options: api.write_clip(expanded, output, **options))
+
+
+def in_memory(clip: Clip) -> Clip:
+    """The clip as if it had been made of arrays, with nothing said of time codes."""
+    return replace(clip, source=None, origin=Origin(), problems=())
+
+
+def assert_shows(path: Path, meant: Clip, skeleton: str | None = None) -> Clip:
+    """Read back, and by UsdSkel's own evaluation, a file shows this clip in world space."""
+    found = api.read_clip(path)
+    assert len(found) == len(meant)
+    assert found.times == pytest.approx(meant.times, abs=1e-6)
+    a, b = forward_kinematics(meant), forward_kinematics(found)
+    assert np.abs(a.positions - b.positions).max() < NEAR_CM
+    assert rot.angle_between(a.rotations, b.rotations).max() < NEAR_DEG
+    worlds = joint_worlds(path, skeleton or found.origin.skeleton_path, found.time_codes)
+    assert np.abs(a.positions - worlds[..., :3, 3]).max() < NEAR_CM
+    u, _, vt = np.linalg.svd(worlds[..., :3, :3])
+    assert rot.angle_between(a.rotations, rot.from_matrix(u @ vt)).max() < NEAR_DEG
+    return found
+
+
+def bend_to_palm(clip: Clip, positions: np.ndarray) -> np.ndarray:
+    """(hands,) mean way of the fingertips from their knuckles out of the palm, cm."""
+    found = []
+    for side, hand in api.find_hands(clip).character.hands.items():
+        index, pinky = (positions[:, hand.joints[f"{d}MCP"]] for d in ("Index", "Pinky"))
+        wrist = positions[:, hand.wrist]
+        normal = np.cross(index - wrist, pinky - wrist) * (1.0 if side == "right" else -1.0)
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        for digit in ("Index", "Middle", "Ring", "Pinky"):
+            way = positions[:, hand.tips[digit]] - positions[:, hand.joints[f"{digit}MCP"]]
+            found.append(np.einsum("ti,ti->t", way, normal).mean())
+    return np.array(found)
