@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.blender import blender_python
+from builders.written_over import assert_shows, channels_scaled
 from conftest import REPOSITORY, SHARED, shared_data
 
 from usdhand.formats.fbx import read
@@ -17,6 +18,7 @@ from usdhand.formats.reading import Reading
 from usdhand.formats.usd import read as usd
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.rigs import map_character
+from usdhand.verbs import find_hands, read_clip, write_clip
 
 pytest.importorskip("ufbx", reason="FBX needs the extra 'convert'")
 pytestmark = pytest.mark.real_data
@@ -87,6 +89,22 @@ def test_agrees_with_the_usd_version(path: Path) -> None:
 def test_hands_are_found(path: Path) -> None:
     character = map_character(clip_of(path).skeleton)
     assert set(character.hands) == {"left", "right"}
+
+
+@pytest.mark.parametrize("path", TAKES, ids=lambda path: path.stem)
+def test_results_lie_over_what_was_read(path: Path, tmp_path: Path) -> None:
+    take = clip_of(path).origin.animation_path
+    clip = read_clip(shared_data(*path.parts), reading=Reading(animation=take))
+    made, output = channels_scaled(clip, 0.5), tmp_path / "out.usdc"
+    write_clip(made, output)
+    left_out = below_scaled(clip)
+    found = assert_shows(output, made, left_out)
+    moving = {j for f in find_hands(clip).frames.values() for j in f.links.moving}
+    skeleton = clip.skeleton
+    lines = {j: {j, *skeleton.ancestors(j)} for j in range(len(skeleton)) if j not in left_out}
+    still = [j for j, line in lines.items() if not moving & line]
+    before, after = forward_kinematics(clip, still), forward_kinematics(found, still)
+    assert np.abs(before.positions - after.positions).max() < TOLERANCE_CM
 
 
 @pytest.mark.blender
