@@ -15,10 +15,10 @@ from builders.gltf_files import glb
 from conftest import REPOSITORY
 from scipy.spatial.transform import Rotation
 
+from usdhand import find_hands, read_clip, write_new
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.editing import trim
-from usdhand.verbs import find_hands, read_clip, write_new
 
 TALK = REPOSITORY / "samples" / "conversations" / "talk_01_full.usdc"
 FRAMES = 90

@@ -12,7 +12,7 @@ from builders.every_format import talk
 from conftest import REPOSITORY
 from oracles.usdskel import joint_worlds
 
-from usdhand import verbs as api
+import usdhand as api
 from usdhand.fill.library import MotionLibrary
 from usdhand.motion import Clip, Origin, forward_kinematics
 from usdhand.motion import rotations as rot

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pxr import Sdf, Usd
 
-from usdhand import verbs as api
+import usdhand as api
 from usdhand.fill.library import MotionLibrary
 from usdhand.formats.paths import relative_path
 

@@ -24,7 +24,7 @@ from builders.written_over import (
 from numpy.testing import assert_allclose
 from pxr import Sdf, Usd, UsdSkel
 
-from usdhand import verbs as api
+import usdhand as api
 from usdhand.errors import InputError
 from usdhand.fill.library import MotionLibrary
 from usdhand.formats.sources import character_under

@@ -22,7 +22,7 @@ from builders.written_over import (
 )
 from numpy.testing import assert_allclose
 
-from usdhand import verbs as api
+import usdhand as api
 from usdhand.fill.library import MotionLibrary
 from usdhand.formats.usd.check import check_file
 from usdhand.motion import Clip, Origin, forward_kinematics

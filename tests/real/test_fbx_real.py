@@ -13,12 +13,12 @@ from builders.blender import blender_python
 from builders.written_over import assert_shows, channels_scaled
 from conftest import REPOSITORY, SHARED, shared_data
 
+from usdhand import find_hands, read_clip, write_clip
 from usdhand.formats.fbx import read
 from usdhand.formats.reading import Reading
 from usdhand.formats.usd import read as usd
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.rigs import map_character
-from usdhand.verbs import find_hands, read_clip, write_clip
 
 pytest.importorskip("ufbx", reason="FBX needs the extra 'convert'")
 pytestmark = pytest.mark.real_data

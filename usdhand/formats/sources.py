@@ -65,6 +65,6 @@ def _checked(clip: Clip) -> Clip:
     if len(early):
         joint = skeleton.joints[int(early[0])]
         raise InputError(
-            f"{clip.name}: the joint {joint} stands before its parent: USD needs it after."
+            f"{clip.name}: the joint {joint} stands before its parent. List parents first."
         )
     return replace(clip, skeleton=legal_skeleton(skeleton))

@@ -67,6 +67,8 @@ def write_clip(
 
     Raises
     ------
+    InputError
+        if the clip does not have the joints of what it was read from.
     OutputError
         if the output is refused or cannot be written.
     """

@@ -81,6 +81,8 @@ def write_filled(
 ) -> tuple[Problem, ...]:
     """Write a filled body as a layer over its file; alternatives are variants of the animation.
 
+    A body that was made in memory becomes a complete character.
+
     Returns what one file, if it was to be one, could not keep.
 
     The variant set ``fingers`` is on the new SkelAnimation; ``choice_1``, the best, is selected.

@@ -88,6 +88,8 @@ def write_rig(
 ) -> tuple[Problem, ...]:
     """Write a reduced clip as a rig over the file it was read from.
 
+    A clip that was made in memory becomes a character with its own motion first.
+
     Returns what one file, if it was to be one, could not keep.
     """
     character = character_under(reduction.clip, animated=True)

@@ -105,7 +105,8 @@ def write_spliced(
 ) -> tuple[Problem, ...]:
     """Write a spliced body as a layer over its file, with the warps as attributes of a Scope.
 
-    The wrists are written too where they are the hand clip's.
+    The wrists are written too where they are the hand clip's. A body that was made in memory
+    becomes a complete character.
     """
     character = character_under(spliced.clip)
     clip = as_on_stage(spliced.clip, character)

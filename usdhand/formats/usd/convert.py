@@ -107,6 +107,8 @@ def write_placed(
         output, [character.path, *stage_files(character.stage), *inputs], force, USD_SUFFIXES
     )
     stage = character.stage
+    if not stage.GetRootLayer().anonymous:
+        raise AssertionError("the stage of a file is not written to")
     layer = layer_over(stage)
     with Sdf.ChangeBlock():
         for path in instances_above(character):
