@@ -9,10 +9,6 @@ class UsdHandError(Exception):
     exit_code = 1
 
 
-class CheckFailedError(UsdHandError):
-    """A check or a comparison did not hold (exit 1)."""
-
-
 class UsageError(UsdHandError):
     """The arguments contradict each other or cannot be carried out (exit 2)."""
 
@@ -45,3 +41,15 @@ class CancelledError(UsdHandError):
     """Work was stopped by whoever watched its progress (exit 130)."""
 
     exit_code = 130
+
+
+class InterruptedBuildError(UsdHandError):
+    """A build of a library was interrupted; what was read is kept (exit 130)."""
+
+    exit_code = 130
+
+
+class TerminatedBuildError(UsdHandError):
+    """A build of a library was ended by SIGTERM; what was read is kept (exit 143)."""
+
+    exit_code = 143

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from usdhand.display import displayed
+
 Severity = Literal["note", "warning", "error"]
 
 LISTED = 3  # names that a message shows before it says "and N more"
 
 
+@displayed()
 @dataclass(frozen=True)
 class Problem:
     """Something that a person should know.

@@ -26,6 +26,7 @@ from usdhand.anatomy.fingertips import fingertips
 from usdhand.anatomy.frames import HandFrames, hand_frames
 from usdhand.anatomy.hand import SIDE_PREFIX, SIDES, CharacterMap, Side
 from usdhand.anatomy.local_motion import LocalMotion
+from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
@@ -36,6 +37,12 @@ FINGER_AXES = ("x", "y", "z")
 THUMB_AXES = ("x", "z", "y")
 
 
+@displayed(
+    lambda channels: {
+        "channels": len(channels),
+        "frames": len(channels.values),
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Channels:
     """Named curves: ``values`` (frames, channels) in degrees, every curve one run of memory."""
@@ -193,6 +200,13 @@ def _with(clip: Clip, motions: Sequence[LocalMotion]) -> Clip:
     return replace(clip, rotations=rotations, translations=translations)
 
 
+@displayed(
+    lambda hands: {
+        "convention": hands.character.convention,
+        **{side: f"{len(frames.names)} joints" for side, frames in hands.frames.items()},
+        "channels": len(hands.all_names),
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Hands:
     """A clip's hands with their frames: what every method starts from."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from usdhand.anatomy.hand import DIGITS, FINGERS, HAND_JOINTS, HandMap, Side, digit_joints
 from usdhand.anatomy.links import HandLinks, Link, hand_links
 from usdhand.anatomy.local_motion import LocalMotion
+from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
@@ -35,6 +36,13 @@ TIP_LENGTH_RANGE = (0.15, 2.5)
 LAST_BONE_RATIO = 0.85
 
 
+@displayed(
+    lambda frames: {
+        "side": frames.side,
+        "joints": len(frames.names),
+        "notes": frames.notes,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class HandFrames:
     """Anatomical frames of one hand, as quaternions in the joints' own axes.

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from usdhand.display import displayed
+
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = ("left", "right")
 DIGITS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
@@ -31,6 +33,14 @@ BODY_JOINTS = ("hips", "chest", "neck", "head")
 ARM_JOINTS = ("clavicle", "shoulder", "elbow", "wrist")
 
 
+@displayed(
+    lambda hand: {
+        "side": hand.side,
+        "wrist": hand.wrist,
+        "joints": len(hand.joints),
+        "missing": hand.missing,
+    }
+)
 @dataclass(frozen=True)
 class HandMap:
     """Which joints of a skeleton are which joints of one hand (indices into the skeleton).
@@ -65,6 +75,13 @@ class HandMap:
         return tuple(n for n in HAND_JOINTS if n not in self.joints)
 
 
+@displayed(
+    lambda character: {
+        "convention": character.convention,
+        "hands": tuple(character.hands),
+        "notes": character.notes,
+    }
+)
 @dataclass(frozen=True)
 class CharacterMap:
     """The hands of a character and the body joints that go with them.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from usdhand.display import displayed
 from usdhand.errors import InputError
 from usdhand.fill.arm import ArmMotion, mirrored
 from usdhand.fill.candidates import part_segments
@@ -33,6 +34,14 @@ COMPARED: tuple[Metric, ...] = (
 )
 
 
+@displayed(
+    lambda agreement: {
+        "metric": agreement.metric,
+        "share": agreement.share,
+        "labels": len(agreement.labels),
+        "segments": agreement.segments,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Agreement:
     """Labels of the nearest segments of other clips.

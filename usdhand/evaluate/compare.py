@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.anatomy.channels import Hands
+from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.motion import Clip, leaf_name
 from usdhand.motion import rotations as rot
@@ -20,6 +21,17 @@ LONGEST_LAG_S = 2.0
 STILL_DEG = 1.0
 
 
+@displayed(
+    lambda found: {
+        "frames": found.frames,
+        "joints": len(found.joints),
+        "channels": len(found.channels),
+        "rms_deg": found.rms_deg,
+        "max_deg": found.max_deg,
+        "fingertip_mean": found.fingertip_mean,
+        "lag": found.lag,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """How motion B differs from motion A, over the time that both last.

@@ -10,6 +10,7 @@ import numpy as np
 
 from usdhand.anatomy import SIDES, Channels, Hands, Side, fingertips
 from usdhand.anatomy.channels import all_channels, turns
+from usdhand.display import displayed
 from usdhand.fill.assemble import Piece, join
 from usdhand.fill.candidates import Candidate, SearchSpace, finger_curves, finger_sources
 from usdhand.fill.library import MotionLibrary, Part
@@ -24,6 +25,7 @@ from usdhand.motion.rotations import Array
 METHODS = ("fill", "nearest", "random", "mean pose", "rest pose", "best candidate")
 
 
+@displayed()
 @dataclass(frozen=True)
 class HandError:
     """Error of one hand of one take: means over frames, joints and digits.

@@ -9,6 +9,7 @@ import numpy as np
 
 from usdhand.anatomy import Hands, Side
 from usdhand.anatomy.channels import all_channels
+from usdhand.display import displayed
 from usdhand.errors import InputError
 from usdhand.fill.arm import FARTHEST_WRIST_CM, ArmMotion, arm_motion
 from usdhand.fill.segment import segments, wrist_speed
@@ -30,6 +31,13 @@ MOST_DEG = 3600.0
 Part = tuple[Side, ...]
 
 
+@displayed(
+    lambda hand: {
+        "joints": len(hand.joints),
+        "frames": len(hand.fingers),
+        "segments": len(hand.segments),
+    }
+)
 @dataclass(frozen=True, eq=False)
 class LibraryHand:
     """One hand of a library clip.
@@ -55,6 +63,16 @@ class LibraryHand:
         return self.fingers[:, columns]
 
 
+@displayed(
+    lambda clip: {
+        "name": clip.name,
+        "label": clip.label,
+        "actor": clip.actor,
+        "hands": tuple(clip.hands),
+        "fps": clip.fps,
+        "seconds": clip.duration,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class LibraryClip:
     """A clip as the library knows it.
@@ -83,6 +101,15 @@ class LibraryClip:
     hands: Mapping[Side, LibraryHand]
 
 
+@displayed(
+    lambda library: {
+        "clips": len(library.clips),
+        "minutes": library.minutes,
+        "segments": sum(len(hand.segments) for c in library.clips for hand in c.hands.values()),
+        "left_out": len(library.left_out),
+        "damaged": len(library.damaged),
+    }
+)
 @dataclass(frozen=True, eq=False)
 class MotionLibrary:
     """Clips in order of their names, and how they were cut.

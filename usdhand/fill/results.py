@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from usdhand.anatomy import Side
+from usdhand.display import displayed
 from usdhand.fill.candidates import Candidate, SearchSpace
 from usdhand.fill.choose import Graph
 from usdhand.fill.library import Part
@@ -14,6 +15,7 @@ from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 
 
+@displayed()
 @dataclass(frozen=True, eq=False)
 class Choice:
     """A segment of the body and what was chosen for it.
@@ -35,6 +37,14 @@ class Choice:
     transition_cost: float
 
 
+@displayed(
+    lambda alternative: {
+        "channels": len(alternative.names),
+        "frames": len(alternative.curves),
+        "segments": len(alternative.choices),
+        "cost": alternative.cost,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Alternative:
     """One way of filling a part: finger channels at the body's frames."""
@@ -46,6 +56,13 @@ class Alternative:
     seams: tuple[int, ...]
 
 
+@displayed(
+    lambda filled: {
+        "part": filled.part,
+        "usable": filled.usable,
+        "alternatives": len(filled.alternatives),
+    }
+)
 @dataclass(frozen=True, eq=False)
 class FilledPart:
     """A part of the body and the ways in which it was filled, best first.
@@ -62,6 +79,16 @@ class FilledPart:
     alternatives: tuple[Alternative, ...]
 
 
+@displayed(
+    lambda filled: {
+        "name": filled.clips[0].name,
+        "frames": len(filled.clips[0]),
+        "hands": tuple(side for part in filled.parts for side in part.part),
+        "segments": sum(len(part.alternatives[0].choices) for part in filled.parts),
+        "alternatives": len(filled.clips),
+        "kept": filled.kept,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Filled:
     """A body clip with fingers.

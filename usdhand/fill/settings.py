@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.options import option
 
@@ -13,6 +14,7 @@ Blend = Literal["smooth", "linear"]
 DEFAULT_METRIC = "arm"
 
 
+@displayed()
 @dataclass(frozen=True)
 class Segmentation:
     """Where to cut. The default was chosen by the error on real takes (docs/fill-figures.md).
@@ -40,6 +42,7 @@ class Segmentation:
 PAPER_SEGMENTATION = Segmentation(speed=10.0, shortest=0.33, longest=2.0)
 
 
+@displayed()
 @dataclass(frozen=True)
 class FillSettings:
     """How fingers are chosen; `PAPER` has the paper's own values.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from usdhand.display import displayed
 from usdhand.options import option
 
 # Centimetres of a unit of length.
@@ -30,6 +31,7 @@ def read_unit(text: str) -> float:
     return number
 
 
+@displayed()
 @dataclass(frozen=True)
 class Reading:
     """What to read of a file, and what it means where it does not say so itself.

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from usdhand.display import displayed
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
 from usdhand.motion.timing import time_codes
@@ -14,6 +15,7 @@ from usdhand.motion.transforms import decompose_trs
 from usdhand.problems import Problem
 
 
+@displayed()
 @dataclass(frozen=True, eq=False)
 class Origin:
     """Where a clip was read from, and what its file measures in: enough to write it back.
@@ -39,6 +41,15 @@ class Origin:
     up_axis: str = "Y"
 
 
+@displayed(
+    lambda clip: {
+        "name": clip.name,
+        "joints": len(clip.skeleton),
+        "frames": len(clip),
+        "fps": clip.fps,
+        "seconds": clip.duration,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Clip:
     """Motion of one character: centimetres, seconds, Y up.

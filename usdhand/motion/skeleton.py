@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from usdhand.display import displayed
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import local_matrices, orientation
 
@@ -37,6 +38,12 @@ def parents_from_paths(joints: Iterable[str]) -> NDArray[np.intp]:
     return np.array([nearest(joint) for joint in joints], dtype=np.intp)
 
 
+@displayed(
+    lambda skeleton: {
+        "joints": len(skeleton),
+        "roots": [name for name, p in zip(skeleton.names, skeleton.parents, strict=True) if p < 0],
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """Joints and their two reference poses.

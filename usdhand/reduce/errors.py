@@ -8,9 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from usdhand.anatomy.channels import Channels
+from usdhand.display import displayed
 from usdhand.motion.rotations import Array
 
 
+@displayed(
+    lambda errors: {
+        "channels": len(errors.names),
+        "rms_deg": errors.rms_deg,
+        "max_deg": errors.max_deg,
+        "fingertip_mean": errors.fingertip_mean,
+        "fingertip_max": errors.fingertip_max,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Errors:
     """Differences of two motions of the same hands.

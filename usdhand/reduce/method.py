@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from usdhand.anatomy.channels import Channels, Hands
+from usdhand.display import displayed
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
 from usdhand.reduce.errors import Errors, distances, measure_errors
@@ -17,6 +18,16 @@ from usdhand.reduce.search import thresholds_for_count, thresholds_for_error
 from usdhand.reduce.settings import Fit, Target, Thresholds
 
 
+@displayed(
+    lambda reduction: {
+        "name": reduction.clip.name,
+        "frames": len(reduction.clip),
+        "channels": len(reduction.rig.relations),
+        "free": len(reduction.rig.free),
+        "rms_deg": reduction.errors.rms_deg,
+        "fingertip_mean": reduction.errors.fingertip_mean,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Reduction:
     """A clip in terms of a rig.

@@ -9,12 +9,14 @@ from typing import Literal
 import numpy as np
 
 from usdhand.anatomy.channels import Channels
+from usdhand.display import displayed
 from usdhand.errors import InputError
 from usdhand.motion.rotations import Array
 
 Kind = Literal["free", "constant", "linear"]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Relation:
     """How one channel gets its value.
@@ -39,6 +41,16 @@ class Relation:
     rms_error: float = 0.0
 
 
+@displayed(
+    lambda rig: {
+        "channels": len(rig.relations),
+        "free": len(rig.free),
+        "range_threshold": rig.range_threshold,
+        "rmsd_threshold": rig.rmsd_threshold,
+        "fit": rig.fit,
+        "sources": rig.sources,
+    }
+)
 @dataclass(frozen=True)
 class ReducedRig:
     """A hand rig of a few free channels.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.options import option
 
@@ -42,6 +43,7 @@ class Target:
             raise UsageError("Give either thresholds, a number of channels, or a largest error.")
 
 
+@displayed()
 @dataclass(frozen=True)
 class ReduceSettings:
     """How a rig is fitted: by one way to say how small it shall be, the paper's step 4 by default.

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import argument, option
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class CheckRequest(Request):
     """Check files with UsdValidation and rules of our own.

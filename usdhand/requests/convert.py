@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from usdhand.display import displayed
 from usdhand.formats.reading import Reading
 from usdhand.options import argument, option, settings
 from usdhand.requests import shared
@@ -31,6 +32,7 @@ def read_span(text: str) -> tuple[float | None, float | None]:
     return first, last
 
 
+@displayed()
 @dataclass(frozen=True)
 class Edits:
     """What is done to a clip between reading and writing.
@@ -65,6 +67,7 @@ class Edits:
         return self.fps is not None or self.trim != (None, None) or self.root_motion == "drop"
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class ConvertRequest(Request):
     """Convert motion between USD, BVH, glTF (also VRM) and FBX (read only).

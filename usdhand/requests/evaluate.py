@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import argument, option
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 from usdhand.requests.fill import Preset
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class EvaluateRequest(Request):
     """Measure how well a library tells fingers from arms, leaving out one clip at a time.

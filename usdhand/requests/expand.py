@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import argument, option
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class ExpandRequest(Request):
     """Turn a reduced rig back into motion, on its own or another character.

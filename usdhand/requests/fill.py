@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from usdhand.display import displayed
 from usdhand.fill.settings import PAPER, FillSettings
 from usdhand.options import argument, option, settings
 from usdhand.requests import shared
@@ -15,6 +16,7 @@ Preset = Literal["default", "paper"]
 PRESETS = {"default": FillSettings(), "paper": PAPER}
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class FillRequest(Request):
     """Give a body clip the fingers of similar motions from a library.

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import argument, option
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class LibraryBuildRequest(Request):
     """Read clips with body and fingers into a library.
@@ -46,6 +48,7 @@ class LibraryBuildRequest(Request):
     force: bool = shared.force()
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class LibraryInfoRequest(Request):
     """Show minutes, clips, actors, segments, labels and problems of a library.

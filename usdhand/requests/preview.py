@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.options import argument, option, settings
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 
 
+@displayed()
 @dataclass(frozen=True)
 class PreviewSettings:
     """What goes into a page.
@@ -36,6 +38,7 @@ class PreviewSettings:
             raise UsageError(f"A page of {self.max_frames} frames shows no motion: give 2 or more.")
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class PreviewRequest(Request):
     """Make a page to look at clips with: one HTML file that opens offline in any browser.

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import argument, option, settings
 from usdhand.reduce.settings import ReduceSettings
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class ReduceRequest(Request):
     """Reduce hands to a rig of a few free channels.

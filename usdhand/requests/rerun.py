@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import argument, option
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class RerunRequest(Request):
     """Make a result again from its report: the same verb, inputs and settings.

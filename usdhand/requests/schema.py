@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import option
 from usdhand.requests.base import Request
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class SchemaRequest(Request):
     """Print the folder of the USD schema for PXR_PLUGINPATH_NAME, or a JSON schema.

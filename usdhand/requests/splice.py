@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import argument, option, settings
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 from usdhand.splice.settings import SpliceSettings
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class SpliceRequest(Request):
     """Put the fingers of a hand clip on a body clip, both of the same performance.

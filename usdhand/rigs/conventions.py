@@ -21,6 +21,7 @@ from usdhand.anatomy.hand import (
     Side,
     digit_joints,
 )
+from usdhand.display import displayed
 from usdhand.errors import UsageError
 
 Table = dict[str, Any]
@@ -54,6 +55,14 @@ def name_key(name: str) -> str:
     return "".join(filter(str.isalnum, name)).lower()
 
 
+@displayed(
+    lambda convention: {
+        "name": convention.name,
+        "sides": tuple(convention.hands),
+        "body": len(convention.body),
+        "own": convention.own,
+    }
+)
 @dataclass(frozen=True)
 class Convention:
     """The joint names of one kind of rig.
@@ -90,6 +99,12 @@ class Convention:
         return tuple(name_key(p) for p in self.prefixes)
 
 
+@displayed(
+    lambda found: {
+        "conventions": [convention.name for convention in found.conventions],
+        "explicit": found.explicit,
+    }
+)
 @dataclass(frozen=True)
 class Conventions:
     """All conventions in order of preference, and joints that a user named one by one.

@@ -9,6 +9,7 @@ import numpy as np
 
 from usdhand.anatomy import Hands, Side
 from usdhand.anatomy.hand import DIGITS, HandMap, digit_joints
+from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
@@ -51,6 +52,12 @@ class HandShape:
     height: float
 
 
+@displayed(
+    lambda grafted: {
+        "clip": grafted.clip.name,
+        **{side: f"{len(joints)} joints" for side, joints in grafted.added.items()},
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Grafted:
     """A clip with finger joints added, and which ones: paths by hand."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from usdhand.anatomy import SIDES, Hands, Side
+from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError, InputError, UsageError
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
@@ -39,6 +40,15 @@ ROOM_SHARE = 0.25
 ROUNDS = 2
 
 
+@displayed(
+    lambda alignment: {
+        "frames": len(alignment.warp),
+        "phases": len(alignment.phases),
+        "pins": len(alignment.pins),
+        "cost": alignment.cost,
+        "pass_lag": alignment.pass_lag,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Alignment:
     """One hand's alignment.
@@ -70,6 +80,14 @@ class Alignment:
         return float(np.median(np.abs(self.warp[:, 1] - self.phase_warp)))
 
 
+@displayed(
+    lambda spliced: {
+        "name": spliced.clip.name,
+        "frames": len(spliced.clip),
+        "hands": tuple(spliced.hands),
+        "notes": spliced.notes,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Spliced:
     """The body with the hand clip's fingers, how each hand was aligned, what was odd, and how."""

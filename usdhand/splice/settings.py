@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.options import option
 
@@ -13,6 +14,7 @@ Directions = Literal["spread", "axes"]
 Wrist = Literal["body", "hands"]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Pin:
     """A moment of the body and the moment of the hand clip that belongs to it.
@@ -50,6 +52,7 @@ def read_band(text: str) -> tuple[float, float]:
     return first, second
 
 
+@displayed()
 @dataclass(frozen=True)
 class SpliceSettings:
     """How clips are aligned; the defaults are the measured best, `PAPER` has the paper's axes.

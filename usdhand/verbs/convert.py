@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from usdhand.anatomy import SIDES
+from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError, UsageError, UsdHandError
 from usdhand.formats.files import (
     animation_names,
@@ -50,6 +51,13 @@ from usdhand.verbs.outcome import Journal, Outcome
 MOST_FRAMES = 10_000_000
 
 
+@displayed(
+    lambda done: {
+        "clip": done.clip,
+        "animated": done.animated,
+        "lost": len(done.lost),
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Converted:
     """What was written.

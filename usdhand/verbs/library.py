@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+from usdhand.display import displayed
 from usdhand.errors import InputError, UsageError, UsdHandError
 from usdhand.fill.library import LibraryClip, MotionLibrary, library_clip
 from usdhand.fill.settings import Segmentation
@@ -22,6 +23,15 @@ from usdhand.rigs import load_conventions
 from usdhand.verbs.clips import find_hands
 
 
+@displayed(
+    lambda built: {
+        "library": built.library,
+        "read": built.read,
+        "unchanged": built.unchanged,
+        "unmatched": len(built.unmatched),
+        "removed": len(built.removed),
+    }
+)
 @dataclass(frozen=True)
 class BuildResult:
     """A built library and how many of its clips were read anew or taken over as they were.

@@ -11,7 +11,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from usdhand.errors import InputError, OutputError, UsdHandError
+from usdhand.errors import (
+    InputError,
+    InterruptedBuildError,
+    OutputError,
+    TerminatedBuildError,
+)
 from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.fill.settings import Segmentation
 from usdhand.formats.output import check_output
@@ -136,18 +141,6 @@ def _what_is_kept(output: Path) -> str:
     kept = f"{counted(count, 'clip')} read so far {verb} kept" if count else "nothing was read yet"
     old = "; the library is as it was" if output.exists() else ""
     return f"Interrupted: {kept}{old}. The same command goes on where it stopped."
-
-
-class InterruptedBuildError(UsdHandError):
-    """A build was interrupted (exit 130)."""
-
-    exit_code = 130
-
-
-class TerminatedBuildError(UsdHandError):
-    """A build was ended by SIGTERM (exit 143)."""
-
-    exit_code = 143
 
 
 class _Terminated(KeyboardInterrupt):

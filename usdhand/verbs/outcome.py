@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from usdhand.display import displayed
 from usdhand.errors import UsdHandError
 from usdhand.problems import Problem, Severity
 from usdhand.progress import each
@@ -74,6 +75,14 @@ class Journal:
         return None if watch is None else lambda done, total: watch(doing, done, total)
 
 
+@displayed(
+    lambda outcome: {
+        "verb": outcome.request.verb,
+        "written": outcome.written,
+        "problems": len(outcome.problems),
+        "exit_code": outcome.exit_code,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What came of a request.
@@ -126,7 +135,3 @@ class Outcome:
     def to_text(self, verbose: bool = False) -> str:
         """Return what a person wants to read."""
         return self.summary(self.result, verbose)
-
-    def __repr__(self) -> str:
-        wrote = ", ".join(map(str, self.written)) or "nothing"
-        return f"Outcome({self.request.verb}: wrote {wrote}, {len(self.problems)} problems)"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from usdhand.anatomy import Side
+from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError, UsageError
 from usdhand.formats.files import is_usd, read_any
 from usdhand.formats.hashing import file_hash
@@ -37,6 +38,13 @@ PAGE_SUFFIXES = (".html", ".htm")
 MOST_SHOWN = 6  # lanes, when the page opens
 
 
+@displayed(
+    lambda page: {
+        "lanes": len(page.lanes),
+        "megabytes": len(page.html) / 1e6,
+        "notes": page.notes,
+    }
+)
 @dataclass(frozen=True, eq=False)
 class Previewed:
     """A page, the clips it was made of, and what a person should know about it."""
