@@ -13,8 +13,8 @@ from usdhand.errors import InputError
 from usdhand.fill.arm import ArmMotion, mirrored
 from usdhand.fill.candidates import part_segments
 from usdhand.fill.library import LibraryClip, MotionLibrary
-from usdhand.fill.metric import Metric
-from usdhand.fill.settings import PAPER_SEGMENTATION, Segmentation
+from usdhand.fill.metric import feature_rows
+from usdhand.fill.settings import PAPER_SEGMENTATION, Metric, Segmentation
 from usdhand.motion.rotations import Array
 from usdhand.search import pack, prepare, search
 
@@ -112,7 +112,7 @@ def _agreement(
     own: list[int] = []
     clips: list[int] = []
     for arm, label, clip in gestures:
-        rows = metric.rows(arm)
+        rows = feature_rows(metric, arm)
         for first, last in part_segments([arm], segmentation):
             pieces.append(rows[first : last + 1])
             own.append(label)

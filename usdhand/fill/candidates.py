@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from usdhand.fill.arm import ArmMotion
 from usdhand.fill.library import ARM_FPS, MotionLibrary, Part
-from usdhand.fill.metric import Metric
+from usdhand.fill.metric import feature_rows
 from usdhand.fill.segment import segments, wrist_speed
-from usdhand.fill.settings import Segmentation
+from usdhand.fill.settings import Metric, Segmentation
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
 from usdhand.search import PackedSegments, SearchIndex, pack, prepare, search, warp_many
@@ -105,7 +105,7 @@ def search_space(
 
 def part_rows(arms: Sequence[ArmMotion], metric: Metric) -> NDArray[np.float32]:
     """Feature rows (frames, D) of the arms of a part together."""
-    return np.concatenate([metric.rows(arm) for arm in arms], axis=1)
+    return np.concatenate([feature_rows(metric, arm) for arm in arms], axis=1)
 
 
 def part_segments(arms: Sequence[ArmMotion], segmentation: Segmentation) -> list[tuple[int, int]]:

@@ -26,7 +26,7 @@ from usdhand.fill.candidates import (
 from usdhand.fill.choose import Graph, choose, graph
 from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate, fingers_moving
 from usdhand.fill.limits import channel_limits
-from usdhand.fill.metric import metric
+from usdhand.fill.metric import metric_of
 from usdhand.fill.path import SegmentPath
 from usdhand.fill.results import Alternative, Choice, Filled, FilledPart
 from usdhand.fill.same import same_motion
@@ -139,7 +139,7 @@ def fill(
 
 def space_for(library: MotionLibrary, part: Part, settings: FillSettings) -> SearchSpace:
     """Make the search space that these settings need."""
-    return search_space(library, part, metric(settings.metric), settings.segmentation)
+    return search_space(library, part, metric_of(settings.metric), settings.segmentation)
 
 
 def moving_sides(channels: Channels, hands: Hands) -> tuple[Side, ...]:

@@ -1,4 +1,4 @@
-"""How alike two arm motions are: the metrics of fill, by name.
+"""How alike two arm motions are: the features that metrics of fill weigh.
 
 A metric turns an `ArmMotion` into feature rows whose squared Euclidean distance is the local cost
 of Joerg, Hodgins & Safonova 2012, section 3.3: centimetres and degrees, weighted.
@@ -7,13 +7,13 @@ of Joerg, Hodgins & Safonova 2012, section 3.3: centimetres and degrees, weighte
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.errors import UsageError
 from usdhand.fill.arm import ArmMotion
+from usdhand.fill.settings import METRICS, Feature, Metric
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
@@ -35,7 +35,7 @@ def _euler(q: Array) -> Array:
 
 
 # Name of a feature -> how it is made from the arm's motion, in cm or degrees.
-FEATURES: Mapping[str, Callable[[ArmMotion], Array]] = {
+FEATURES: Mapping[Feature, Callable[[ArmMotion], Array]] = {
     "hips_position": lambda a: a.hips_position,
     "chest_position": lambda a: a.chest_position,
     "shoulder_position": lambda a: a.shoulder_position,
@@ -51,42 +51,22 @@ FEATURES: Mapping[str, Callable[[ArmMotion], Array]] = {
 }
 
 
-@dataclass(frozen=True)
-class Metric:
-    """Weights of features; the cost of two frames is the weighted sum of squared distances."""
-
-    name: str
-    weights: Mapping[str, float]
-
-    def rows(self, arm: ArmMotion) -> NDArray[np.float32]:
-        """(frames, D) float32 feature rows."""
-        columns = [np.sqrt(w) * FEATURES[name](arm) for name, w in self.weights.items()]
-        return np.concatenate(columns, axis=1).astype(np.float32)
+def feature_rows(metric: Metric, arm: ArmMotion) -> NDArray[np.float32]:
+    """(frames, D) float32 rows; the squared distance of two is the cost of the metric."""
+    columns = [np.sqrt(w) * FEATURES[name](arm) for name, w in metric.weights.items()]
+    return np.concatenate(columns, axis=1).astype(np.float32)
 
 
-METRICS: dict[str, Metric] = {
-    m.name: m
-    for m in (
-        # The paper's own: position and Euler angles of the wrist relative to the root, 1 and 0.5.
-        Metric("euler", {"hips_position": 1.0, "euler_palm": 0.5}),
-        Metric("chordal", {"hips_position": 1.0, "hips_palm": 0.5}),
-        # The default: from the shoulder, with the elbow, and how the wrist bends.
-        Metric(
-            "arm",
-            {"shoulder_position": 1.0, "elbow_position": 0.5, "chest_palm": 0.5, "wrist": 1.0},
-        ),
-    )
-}
-
-
-def metric(name: str) -> Metric:
-    """The metric with this name.
+def metric_of(named: str | Metric) -> Metric:
+    """Return a metric as it is, or the one with this name.
 
     Raises
     ------
     UsageError
         if there is none.
     """
-    if name not in METRICS:
-        raise UsageError(f"There is no metric '{name}'; there are {', '.join(METRICS)}.")
-    return METRICS[name]
+    if isinstance(named, Metric):
+        return named
+    if named not in METRICS:
+        raise UsageError(f"There is no metric '{named}'; there are {', '.join(METRICS)}.")
+    return METRICS[named]

@@ -13,6 +13,7 @@ from usdhand.anatomy import Side
 from usdhand.fill.arm import ArmMotion
 from usdhand.fill.library import ARM_FPS, MotionLibrary
 from usdhand.fill.metric import FEATURES
+from usdhand.fill.settings import Feature
 from usdhand.motion.rotations import Array
 
 # Feature of the arm -> root mean square by which two takes of one performance differ at most, and
@@ -20,7 +21,10 @@ from usdhand.motion.rotations import Array
 # after retargeting by the hands' places, rotations on a body of other proportions. Of 24 takes on
 # two rigs, palms turn alike within 0.04 degrees; those of different takes differ by 8 or more. (A
 # root mean square of 1 over the nine numbers of a rotation is 3 degrees.)
-ALIKE: Mapping[str, tuple[float, float]] = {"hips_position": (1.0, 5.0), "hips_palm": (1.0, 15.0)}
+ALIKE: Mapping[Feature, tuple[float, float]] = {
+    "hips_position": (1.0, 5.0),
+    "hips_palm": (1.0, 15.0),
+}
 LONGEST_OFFSET_S = 1.0
 SMALLEST_OVERLAP = 0.7
 # An excerpt is looked for all along the longer motion. The shorter it is, the more is like it by

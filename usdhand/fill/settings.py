@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from usdhand.display import displayed
 from usdhand.errors import UsageError
@@ -11,6 +13,63 @@ from usdhand.options import option
 
 Blend = Literal["smooth", "linear"]
 
+# What can be compared of two arms, in centimetres or degrees; `usdhand.fill.metric` makes it.
+Feature = Literal[
+    "hips_position",
+    "chest_position",
+    "shoulder_position",
+    "elbow_position",
+    "shoulder_from_hips",
+    "elbow_from_hips",
+    "upper_arm",
+    "forearm",
+    "hips_palm",
+    "chest_palm",
+    "euler_palm",
+    "wrist",
+]
+
+
+@displayed()
+@dataclass(frozen=True)
+class Metric:
+    """How alike two arm motions are: the weighted sum of squared distances of features.
+
+    Attributes
+    ----------
+    name : for reports
+    weights : feature -> weight above 0; positions are in cm, rotations in degrees. One of
+        hips_position, chest_position, shoulder_position, elbow_position (of the wrist, seen from
+        there), shoulder_from_hips, elbow_from_hips, upper_arm, forearm, hips_palm, chest_palm,
+        euler_palm (rotations) and wrist (how it bends)
+    """
+
+    name: str
+    weights: Mapping[Feature, float]
+
+    def __post_init__(self) -> None:
+        if unknown := set(self.weights) - set(get_args(Feature)):
+            raise UsageError(
+                f"The metric {self.name} has no feature '{min(unknown)}' to compare; there are "
+                f"{', '.join(get_args(Feature))}."
+            )
+        if not self.weights or not all(0.0 < w < math.inf for w in self.weights.values()):
+            raise UsageError(f"The metric {self.name} needs weights above 0, one at least.")
+
+
+METRICS: Mapping[str, Metric] = {
+    m.name: m
+    for m in (
+        # The paper's own: position and Euler angles of the wrist relative to the root, 1 and 0.5.
+        Metric("euler", {"hips_position": 1.0, "euler_palm": 0.5}),
+        Metric("chordal", {"hips_position": 1.0, "hips_palm": 0.5}),
+        # The default: from the shoulder, with the elbow, and how the wrist bends.
+        Metric(
+            "arm",
+            {"shoulder_position": 1.0, "elbow_position": 0.5, "chest_palm": 0.5, "wrist": 1.0},
+        ),
+    )
+}
 DEFAULT_METRIC = "arm"
 
 
@@ -49,7 +108,7 @@ class FillSettings:
 
     Attributes
     ----------
-    metric : name of the metric of arm motion
+    metric : of arm motion: the name of one of `METRICS`, or one of your own
     k : candidates a segment
     factor : largest ratio of lengths of a segment and its candidate
     pool : neighbours that say which of them is typical; 0: no opinion
@@ -63,7 +122,7 @@ class FillSettings:
     couple : take both hands from the same clip
     """
 
-    metric: str = option(
+    metric: str | Metric = option(
         "How arm motions are compared: arm, chordal or euler (the paper's).", default=DEFAULT_METRIC
     )
     k: int = option("Candidates a segment.", default=5, at_least=1)

@@ -119,6 +119,11 @@ def _of(kind: Any, value: Any, where: str) -> Any:
         if missing := [name for name in needed if name not in value]:
             raise UsageError(f"'{where}' needs '{missing[0]}'.")
         return kind(**{k: _value(hints[k], v, f"{where}.{k}") for k, v in value.items()})
+    if origin is Mapping and isinstance(value, Mapping):
+        names, values = get_args(kind)
+        return {
+            _value(names, k, where): _value(values, v, f"{where}.{k}") for k, v in value.items()
+        }
     if kind is Path and isinstance(value, str):
         return Path(value)
     if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -137,7 +142,7 @@ def described(kind: Any) -> str:
             parts.append("one of " + ", ".join(map(repr, get_args(one))))
         elif get_origin(one) is tuple:
             parts.append("a list")
-        elif is_settings(one):
+        elif is_settings(one) or get_origin(one) is Mapping:
             parts.append("an object")
         else:
             parts.append(words.get(one, "a path"))
@@ -149,4 +154,6 @@ def _plain(value: Any) -> Any:
         return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, (list, tuple)):
         return [_plain(v) for v in value]
+    if isinstance(value, Mapping):
+        return {k: _plain(v) for k, v in value.items()}
     return str(value) if isinstance(value, Path) else value

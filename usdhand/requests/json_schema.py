@@ -68,6 +68,9 @@ def _one(kind: Any) -> dict[str, Any]:
             return {"type": "array", "items": _schema(inner[0])}
         items = [_schema(k) for k in inner]
         return {"type": "array", "prefixItems": items, "minItems": len(items), "items": False}
+    if origin is Mapping:
+        keys, values = (_schema(k) for k in inner)
+        return {"type": "object", "propertyNames": keys, "additionalProperties": values}
     if is_settings(kind):
         return _object(kind)
     names: Mapping[Any, str] = {
