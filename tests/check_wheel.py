@@ -10,7 +10,7 @@ WANTED = (
     "usdhand/schemas/plugInfo.json",
     "usdhand/schemas/generatedSchema.usda",
     "usdhand/schemas/schema.usda",
-    "usdhand/anatomy/conventions.toml",
+    "usdhand/rigs/conventions.toml",
     "usdhand/formats/fbx/worker.py",
     "usdhand/report/preview/viewer/page.html",
     "usdhand/report/preview/viewer/three.core.min.js",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from usdhand.anatomy.hand import (
     ARM_JOINTS,
@@ -116,40 +116,42 @@ class Conventions:
     explicit: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
-def load_conventions(*extra: Path) -> Conventions:
-    """Read the packaged conventions and users' files on top of them.
+def load_conventions(*extra: str | Path | Mapping[str, Mapping[str, Any]]) -> Conventions:
+    """Return the packaged conventions with a user's on top of them.
 
     Parameters
     ----------
-    extra : map files; a later file wins over an earlier one, all win over the package
+    extra : map files, or tables as such a file has them; later ones win over earlier ones, all win
+        over the package
 
     Raises
     ------
     UsageError
-        A file cannot be read or a key is wrong; the message names both.
+        if a file cannot be read or a key is wrong; the message names both.
     """
     if not extra:
         return _packaged()
     tables = dict(_packaged_tables())
     own: dict[str, str] = {}  # convention -> its file, the latest file first
     explicit: dict[str, dict[str, str]] = {}
-    for path in extra:
-        for name, table in _read(path).items():
-            where = f"{path}: [{name}]"
-            if not isinstance(table, dict):
-                raise UsageError(f"{path}: '{name}' stands outside a table; see {_EXAMPLE}")
+    for given in extra:
+        source = "conventions" if isinstance(given, Mapping) else str(given)
+        for name, table in (given if isinstance(given, Mapping) else _read(given)).items():
+            where = f"{source}: [{name}]"
+            if not isinstance(table, Mapping):
+                raise UsageError(f"{source}: '{name}' stands outside a table; see {_EXAMPLE}")
             if name in (*SIDES, "body"):
                 explicit.setdefault(name, {}).update(_explicit(table, name, where))
             else:
                 _check(table, where)
-                tables[name] = table
-                own = {name: str(path)} | {n: p for n, p in own.items() if n != name}
+                tables[name] = dict(table)
+                own = {name: source} | {n: p for n, p in own.items() if n != name}
     user = tuple(_convention(name, tables, file, own=True) for name, file in own.items())
     packaged = tuple(c for c in _packaged().conventions if c.name not in own)
     return Conventions((*user, *packaged), explicit)
 
 
-_EXAMPLE = "usdhand/anatomy/conventions.toml for the format"
+_EXAMPLE = "usdhand/rigs/conventions.toml for the format"
 
 
 @cache
@@ -164,7 +166,7 @@ def _packaged() -> Conventions:
     return Conventions(tuple(_convention(name, tables, "conventions.toml") for name in tables))
 
 
-def _read(path: Path) -> Table:
+def _read(path: str | Path) -> Table:
     try:
         return tomllib.loads(Path(path).read_text("utf-8"))
     except OSError as error:
@@ -173,17 +175,17 @@ def _read(path: Path) -> Table:
         raise UsageError(f"{path}: is no valid TOML: {error}") from error
 
 
-def _explicit(table: Table, name: str, where: str) -> dict[str, str]:
+def _explicit(table: Mapping[str, Any], name: str, where: str) -> dict[str, str]:
     allowed = BODY_JOINTS if name == "body" else HAND_ROLES
     for key, value in table.items():
         if key not in allowed:
             raise UsageError(f"{where} {key}: no such joint; one of {', '.join(allowed)}")
         if not isinstance(value, str) or not value:
             raise UsageError(f"{where} {key}: must be the name of a joint, not {value!r}")
-    return table
+    return dict(table)
 
 
-def _check(table: Table, where: str) -> None:
+def _check(table: Mapping[str, Any], where: str) -> None:
     """Refuse a convention whose keys or values are not of the documented form."""
     for key, value in table.items():
         if key not in _KEYS:
@@ -194,7 +196,7 @@ def _check(table: Table, where: str) -> None:
             count = 2 if key == "side" else 4
             good, form = _is_list(value) and len(value) == count, f"a list of {count} strings"
         elif key in ("thumb", "finger"):
-            good = isinstance(value, list) and len(value) == 3 and all(map(_is_name, value))
+            good = _is_sequence(value) and len(value) == 3 and all(map(_is_name, value))
             form = "a list of three names"
         else:
             good, form = _is_name(value), "a name or a list of names"
@@ -202,8 +204,12 @@ def _check(table: Table, where: str) -> None:
             raise UsageError(f"{where} {key}: must be {form}, not {value!r}")
 
 
-def _is_list(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(v, str) and v for v in value)
+def _is_sequence(value: object) -> TypeGuard[Sequence[object]]:
+    return isinstance(value, (list, tuple))
+
+
+def _is_list(value: object) -> TypeGuard[Sequence[str]]:
+    return _is_sequence(value) and all(isinstance(v, str) and v for v in value)
 
 
 def _is_name(value: object) -> bool:
@@ -265,7 +271,7 @@ def _spelled_out(table: Table) -> Iterator[tuple[str, Names]]:
             yield role, _names(table[role])
 
 
-def _names(value: str | list[str] | Names) -> Names:
+def _names(value: str | Sequence[str]) -> Names:
     return (value,) if isinstance(value, str) else tuple(value)
 
 
