@@ -37,3 +37,19 @@ def told(done: int, total: int, progress: Progress | None) -> None:
     """
     if progress is not None and progress(done, total) is False:
         raise CancelledError(f"Stopped after {done} of {total} steps, as asked.")
+
+
+class Steps:
+    """Counts the steps of several pieces of work as one.
+
+    Raises `CancelledError` where ``progress`` returns False, also right at the beginning.
+    """
+
+    def __init__(self, total: int, progress: Progress | None) -> None:
+        self.done, self.total, self._progress = 0, total, progress
+        self.add(0)
+
+    def add(self, count: int = 1) -> None:
+        """Tell that so many more steps are done."""
+        self.done += count
+        told(self.done, self.total, self._progress)

@@ -33,9 +33,12 @@ from usdhand.fill.same import same_motion
 from usdhand.fill.settings import FillSettings, Segmentation
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
+from usdhand.progress import Progress, Steps
 
 # A segment of the body has at least so many frames: speeds and seams need some.
 FEWEST_FRAMES = 3
+# Segments that are searched for together: enough to keep all threads busy.
+AT_ONCE = 200
 
 
 def fill(
@@ -48,6 +51,7 @@ def fill(
     replace_motion: bool = False,
     content_hash: str | None = None,
     spaces: Mapping[Part, SearchSpace] | None = None,
+    progress: Progress | None = None,
 ) -> Filled:
     """Give a body clip the fingers of similar motions.
 
@@ -58,6 +62,8 @@ def fill(
     content_hash : of the body's file: the library's clip with the same content, or with the same
         name, is the very motion that is filled, and left out
     spaces : search spaces made before, to fill many bodies from one library
+    progress : gets how many segments are done, those of each hand, and how many there are; False
+        stops
 
     Raises
     ------
@@ -65,6 +71,8 @@ def fill(
         if all hands already move and may not be replaced.
     InputError
         if the library has no motion for any of the hands, or the body is a single frame.
+    CancelledError
+        if ``progress`` returned False.
     """
     settings = settings or FillSettings()
     if len(body) < 2:
@@ -90,18 +98,22 @@ def fill(
         raise InputError(
             "No clip of the library has both hands; fill each hand on its own (without --couple)."
         )
+    cut = [_cut([arms[side] for side in part], settings, library, body.fps) for part in parts]
+    steps = Steps(sum(map(len, cut)), progress)
     filled = tuple(
         _fill_part(
             body.fps,
             len(body),
             [arms[side] for side in part],
             [joints[side] for side in part],
+            borders,
             library,
             (spaces or {}).get(part) or space_for(library, part, settings),
             settings,
             _usable_clips(library, joints, part, own),
+            steps,
         )
-        for part in parts
+        for part, borders in zip(parts, cut, strict=True)
     )
     column = {name: i for i, name in enumerate(channels.names)}
     changed = [
@@ -228,30 +240,33 @@ def _fill_part(
     frames: int,
     arms: Sequence[ArmMotion],
     joints: Sequence[tuple[str, ...]],
+    cut: Sequence[tuple[int, int]],
     library: MotionLibrary,
     space: SearchSpace,
     settings: FillSettings,
     usable: frozenset[int],
+    steps: Steps,
 ) -> FilledPart:
     part = space.part
     names = tuple(
         n for side, own in zip(part, joints, strict=True) for n in all_channels(side, own)
     )
-    cut = part_segments(arms, _for_rate(space.segmentation, fps))
     rows = part_rows(arms, space.metric)
-    found = find_candidates(
-        [rows[a : b + 1] for a, b in cut],
-        space,
-        max(settings.k, settings.pool),
-        settings.factor,
-        [i for i in range(len(library.clips)) if i not in usable],
-    )
     sources = finger_sources(library, part, joints, usable)
+    others = [i for i in range(len(library.clips)) if i not in usable]
     borders = _body_frames(cut, fps, frames)
-    curves = [
-        finger_curves(candidates, space, sources, np.arange(b - a + 1) / fps)
-        for (a, b), candidates in zip(borders, found, strict=True)
-    ]
+    found: list[list[Candidate]] = []
+    curves: list[Array] = []
+    for start in range(0, len(cut), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
+        queries = [rows[a : b + 1] for a, b in cut[some]]
+        count = max(settings.k, settings.pool)
+        found += find_candidates(queries, space, count, settings.factor, others)
+        curves += [
+            finger_curves(candidates, space, sources, np.arange(b - a + 1) / fps)
+            for (a, b), candidates in zip(borders[some], found[some], strict=True)
+        ]
+        steps.add(len(queries))
     network = graph(found, curves, names, fps, settings)
     low, high = channel_limits(library, part, joints)
     alternatives = []
@@ -296,6 +311,13 @@ def _choices(
             )
         )
     return tuple(choices)
+
+
+def _cut(
+    arms: Sequence[ArmMotion], settings: FillSettings, library: MotionLibrary, fps: float
+) -> list[tuple[int, int]]:
+    """Segments of the body, first and last frame at `ARM_FPS`."""
+    return part_segments(arms, _for_rate(settings.segmentation or library.segmentation, fps))
 
 
 def _for_rate(segmentation: Segmentation, fps: float) -> Segmentation:

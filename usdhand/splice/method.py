@@ -12,6 +12,7 @@ from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError, InputError, UsageError
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
+from usdhand.progress import Progress, Steps
 from usdhand.splice.band import (
     Band,
     anchors_of,
@@ -38,6 +39,8 @@ MOST_BAND_S = 10.0
 ROOM_SHARE = 0.25
 # Rounds of matching signs with the hand clip in the body's time.
 ROUNDS = 2
+# Of a hand's alignment, for whoever watches: the path of pass 1, its rounds, and pass 2.
+STEPS = 1 + ROUNDS + 1
 
 
 @displayed(
@@ -104,10 +107,16 @@ def splice(
     body_hands: Hands,
     hand_hands: Hands,
     settings: SpliceSettings | None = None,
+    progress: Progress | None = None,
 ) -> Spliced:
     """Give a body clip the fingers of a hand clip of the same performance.
 
     Hands that both clips have are aligned each on its own.
+
+    Parameters
+    ----------
+    progress : gets how many rounds of alignment are done, those of each hand, and how many there
+        are; False stops
 
     Raises
     ------
@@ -118,6 +127,8 @@ def splice(
         body's fingers move and none of the hand clip's do.
     UsageError
         if pins cannot hold, or the clips' lengths are too different.
+    CancelledError
+        if ``progress`` returned False.
     """
     settings = settings or SpliceSettings()
     sides = [s for s in SIDES if s in body_hands.frames and s in hand_hands.frames]
@@ -146,7 +157,7 @@ def splice(
         settings.fps,
         lambda: pin_advice(body, hand_clip, body_hands, hand_hands, sides),
     )
-    found, more = _aligned_hands(body, hand_clip, body_hands, hand_hands, settings, pins)
+    found, more = _aligned_hands(body, hand_clip, body_hands, hand_hands, settings, pins, progress)
     notes += more + moving_fingers(body, hand_clip, body_hands, hand_hands, sides)
     clip, hands = body, {}
     for side, alignment in found.items():
@@ -162,9 +173,18 @@ def splice(
 
 
 def align(
-    body: Markers, hand: Markers, settings: SpliceSettings, pins: Sequence[Pin], times: Array
+    body: Markers,
+    hand: Markers,
+    settings: SpliceSettings,
+    pins: Sequence[Pin],
+    times: Array,
+    steps: Steps | None = None,
 ) -> tuple[Array, Array, int]:
-    """Seconds of the hand clip (times,) after pass 2 and after pass 1, and the cost of pass 1."""
+    """Seconds of the hand clip (times,) after pass 2 and after pass 1, and the cost of pass 1.
+
+    It takes `STEPS` steps.
+    """
+    steps = steps or Steps(STEPS, None)
     band = first_band(len(body), len(hand), settings, pins)
     signs = settings.smoothing, settings.dead_zone
     path = phase_path(body, hand, band, *signs, settings.align, settings.directions)
@@ -173,6 +193,7 @@ def align(
     if settings.align == "local":
         near = band_along(path.first, path.last, band, reach)
         path = steadied(body, hand, path, near, *signs, settings.directions)
+    steps.add()
     own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps
     room = _room(own_times, pins)
     first = path.open_ended
@@ -182,16 +203,19 @@ def align(
         first = settled(
             body, hand, first, room * body.fps, *signs, settings.align, settings.directions
         )
+        steps.add()
 
     def in_time(warp: Array) -> Array:
         seconds = np.clip(np.interp(times, own_times, warp / hand.fps), 0.0, end)
         return through_pins(seconds, times, pins)
 
     if settings.tether == 0:
+        steps.add()
         return in_time(first), in_time(first), path.cost
     tether = settings.tether * hand.fps
     first = through_pins(first / hand.fps, own_times, pins) * hand.fps
     second = refined(body, hand, first, np.minimum(room * hand.fps, reach), settings.align, tether)
+    steps.add()
     return in_time(second), in_time(first), path.cost
 
 
@@ -231,6 +255,7 @@ def _aligned_hands(
     hand_hands: Hands,
     settings: SpliceSettings,
     pins: Mapping[Side, tuple[Pin, ...]],
+    progress: Progress | None,
 ) -> tuple[dict[Side, Alignment], list[str]]:
     """Alignments of the hands that move; hands that hardly do follow the other one."""
     times = np.arange(len(body)) / body.fps
@@ -244,8 +269,9 @@ def _aligned_hands(
     reach = {s: min(_reach(m, settings.smoothing) for m in both) for s, both in markers.items()}
     enough = max(STILL, LEAST_SHARE * max(reach.values()))
     still = [side for side in pins if reach[side] < enough]
+    steps = Steps(STEPS * (len(pins) - len(still)), progress)
     found = {
-        side: _aligned(*markers[side], settings, own, times)
+        side: _aligned(*markers[side], settings, own, times, steps)
         for side, own in pins.items()
         if side not in still
     }
@@ -279,11 +305,16 @@ def _aligned_hands(
 
 
 def _aligned(
-    ours: Markers, theirs: Markers, settings: SpliceSettings, pins: tuple[Pin, ...], times: Array
+    ours: Markers,
+    theirs: Markers,
+    settings: SpliceSettings,
+    pins: tuple[Pin, ...],
+    times: Array,
+    steps: Steps,
 ) -> Alignment:
     if settings.align == "trunk" and any(m.facing is None for m in (ours, theirs)):
         raise UsageError("A clip has no trunk to align by: use --align local.")
-    second, first, cost = align(ours, theirs, settings, pins, times)
+    second, first, cost = align(ours, theirs, settings, pins, times, steps)
     warp = np.interp(np.arange(len(ours)) / ours.fps, times, second)
     return Alignment(
         np.stack([times, second], axis=1),
