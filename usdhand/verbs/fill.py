@@ -22,6 +22,7 @@ from usdhand.formats.usd.library import is_library, read_library
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 from usdhand.problems import Problem
+from usdhand.progress import Progress
 from usdhand.report.fill import fill_result, summary
 from usdhand.report.fill_problems import fill_problems
 from usdhand.report.plots import filling as plotting
@@ -45,8 +46,30 @@ def fill_fingers(
     sides: Sequence[Side] = SIDES,
     replace_motion: bool = False,
     conventions: Conventions | None = None,
+    progress: Progress | None = None,
 ) -> Filled:
-    """Give a body clip the fingers of similar motions; see `usdhand.fill.fill`."""
+    """Give a body clip the fingers of similar motions.
+
+    The library's clip of the very same motion, by its content or as it moves, is left out.
+
+    Parameters
+    ----------
+    sides : hands to fill
+    replace_motion : also replace finger motion that is there and moves
+    progress : gets how many segments are done, those of each hand, and how many there are; what
+        returns False stops
+
+    Raises
+    ------
+    UsageError
+        if all hands already move and may not be replaced.
+    HandNotFoundError
+        if the body has no hand, or no finger joints (`add_finger_joints` adds some).
+    InputError
+        if the library has no motion for any of the hands, or the body is a single frame.
+    CancelledError
+        if ``progress`` returned False.
+    """
     try:
         hands = find_hands(body, conventions, sides)
     except HandNotFoundError as error:
@@ -68,6 +91,7 @@ def fill_fingers(
         sides=sides,
         replace_motion=replace_motion,
         content_hash=content,
+        progress=progress,
     )
 
 
@@ -125,6 +149,7 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
         sides=wanted,
         replace_motion=request.replace,
         conventions=conventions,
+        progress=journal.progress("filling"),
     )
     journal.tell(*fill_problems(filled, library, request.settings, str(request.body)))
     if not request.dry_run:

@@ -19,6 +19,7 @@ from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.warp import author_warps
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip, Problem
+from usdhand.progress import Progress
 from usdhand.report.plots import splicing as plotting
 from usdhand.report.plots.style import check_plots
 from usdhand.report.splice import splice_result, summary
@@ -42,6 +43,7 @@ def splice_hands(
     pins: Sequence[Pin | str] = (),
     sides: Sequence[Side] = SIDES,
     conventions: Conventions | None = None,
+    progress: Progress | None = None,
 ) -> Spliced:
     """Give a body clip the fingers of a hand clip of the same performance.
 
@@ -49,6 +51,20 @@ def splice_hands(
     ----------
     pins : moments that belong together, besides those of the settings: `Pin` in seconds from the
         clips' first frames, or texts in time codes of their clips, see `parse_pin`
+    progress : gets how many rounds of alignment are done, those of each hand, and how many there
+        are; what returns False stops
+
+    Raises
+    ------
+    HandNotFoundError
+        if the clips have no hand, or no finger joint of one, in common.
+    InputError
+        if no hand moves, so that there is nothing to align, and pins do not tell either; if the
+        body's fingers move and none of the hand clip's do.
+    UsageError
+        if pins cannot hold, or the clips' lengths are too different.
+    CancelledError
+        if ``progress`` returned False.
     """
     settings = settings or SpliceSettings()
     own = tuple(parse_pin(p, body, hands) if isinstance(p, str) else p for p in pins)
@@ -59,6 +75,7 @@ def splice_hands(
         find_hands(body, conventions, sides),
         find_hands(hands, conventions, sides),
         settings,
+        progress,
     )
 
 
@@ -66,6 +83,11 @@ def parse_pin(text: str, body: Clip, hands: Clip) -> Pin:
     """Read a pin ``[left:|right:]BODY:HAND[:TOLERANCE]`` in time codes of the clips' files.
 
     The tolerance is in time codes of the hand clip; without one the pin is exact.
+
+    Raises
+    ------
+    UsageError
+        if it is no such text, or a time code is outside of its clip.
     """
     first, _, rest = text.partition(":")
     side = next((s for s in SIDES if s == first.strip().lower()), None)
@@ -151,6 +173,7 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
         pins=request.pins,
         sides=sides(request.side),
         conventions=conventions,
+        progress=journal.progress("splicing"),
     )
     for note in spliced.notes:
         journal.warn("splice", note, f"{body} with {hands}")
