@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import Field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -41,6 +42,8 @@ def _values(kind: Any) -> st.SearchStrategy[Any]:
         if inner[1:] == (...,):
             return st.lists(values(inner[0]), max_size=3).map(tuple)
         return st.tuples(*map(values, inner))
+    if get_origin(kind) is Mapping:
+        return st.dictionaries(*map(values, get_args(kind)), min_size=1, max_size=3)
     if is_dataclass(kind):
         return st.builds(_built, st.just(kind), members(kind)).filter(lambda made: made is not None)
     simple: dict[Any, st.SearchStrategy[Any]] = {

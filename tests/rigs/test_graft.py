@@ -248,7 +248,7 @@ def test_wrists_named_in_a_map_file(tmp_path: Path, ada: Clip) -> None:
     table.write_text(
         "".join(f'[{s}]\nwrist = "{joints[kept.index(w)]}"\n' for s, w in wrists.items())
     )
-    conventions = usdhand.conventions_from([table])
+    conventions = usdhand.load_conventions(table)
     made = add_finger_joints(nameless, ada.skeleton, usdhand.find_hands(ada), conventions)
     assert [len(f.names) for f in usdhand.find_hands(made.clip, conventions).frames.values()] == [
         15,
