@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
+from usdhand.display import displayed
 from usdhand.options import declared
 
 
+@displayed()
 @dataclass(frozen=True, kw_only=True)
 class Request:
     """Base of all requests.
