@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from pathlib import Path
+from typing import Any, ClassVar, get_args, get_origin
 
 from usdhand.display import displayed
-from usdhand.options import declared
+from usdhand.errors import UsageError
+from usdhand.options import alternatives, declared
 
 
 @displayed()
@@ -15,7 +17,8 @@ from usdhand.options import declared
 class Request:
     """Base of all requests.
 
-    The docstring of a request is the help of its verb.
+    The docstring of a request is the help of its verb. Where it has a path, the name as a text will
+    do, and a list where it has several of something.
 
     Attributes
     ----------
@@ -25,6 +28,11 @@ class Request:
 
     verb: ClassVar[str]
     verbose: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        for own in declared(type(self)):
+            value = getattr(self, own.name)
+            object.__setattr__(self, own.name, _as_declared(own.name, own.type, value))
 
     def reported(self) -> dict[str, Any]:
         """Return the settings as reports have them: by key, those of settings among the others."""
@@ -36,6 +44,19 @@ class Request:
             elif own.option.reported:
                 found[own.key] = value
         return found
+
+
+def _as_declared(name: str, kind: Any, value: Any) -> Any:
+    """A value as its field has it: paths of texts or texts of paths, tuples of lists."""
+    for one in alternatives(kind):
+        if get_origin(one) is tuple and get_args(one)[1:] == (...,):
+            if isinstance(value, (str, Path)):
+                raise UsageError(f"'{name}' takes several: give a list, [{str(value)!r}].")
+            if isinstance(value, Iterable):
+                return tuple(_as_declared(name, get_args(one)[0], item) for item in value)
+        if one in (Path, str) and isinstance(value, (Path, str)):
+            return one(value)
+    return value
 
 
 def _settings(value: Any, key: str) -> dict[str, Any]:
