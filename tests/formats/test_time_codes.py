@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,13 @@ from builders.gltf_files import moving_arm
 from oracles.usdskel import assert_same_world
 from pxr import Sdf, Usd
 
-from usdhand import read_clip
+from usdhand import read_clip, write_clip
 from usdhand.formats.fbx import read as fbx
 from usdhand.formats.usd.stage import find_character
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
+from usdhand.motion.editing import counted_in_frames, recounted
 
 RATES = [24.0, 29.97, 30000 / 1001, 23.976, 59.94]
 FIRST, FRAMES = 1003, 12
@@ -125,11 +127,19 @@ def test_time_codes_that_are_no_whole_numbers_stay_what_they_are(tmp_path: Path)
 
 @pytest.mark.parametrize("rate", RATES)
 def test_results_over_a_file_have_its_time_codes(tmp_path: Path, rate: float) -> None:
-    source, out = character(tmp_path / "a.usda", rate), tmp_path / "b.usda"
+    source = character(tmp_path / "a.usda", rate)
     clip = read_clip(source)
     turned = clip.with_rotations(rot.normalize(clip.rotations + 0.1))
-    write_motion(find_character(source), turned, [3], out)
-    assert_written(out, CODES, rate)
+    for name, result in (
+        ("same", turned),
+        ("counted otherwise", recounted(turned, 2.0 * rate)),
+        ("in memory", counted_in_frames(turned)),
+    ):
+        out = tmp_path / f"{name}.usda"
+        write_motion(find_character(source), result, [3], out)
+        assert_written(out, CODES, rate)
+    write_clip(replace(turned, source=None), tmp_path / "new.usda")
+    assert_written(tmp_path / "new.usda", CODES, rate)
 
 
 # --- one sample ----------------------------------------------------------------------------------

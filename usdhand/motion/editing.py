@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -58,12 +59,16 @@ def counted_in_frames(clip: Clip) -> Clip:
 
 def recounted(clip: Clip, per_second: float) -> Clip:
     """Return the clip at the same times, so many time codes being a second."""
-    old = clip.origin.time_codes_per_second
+    origin, step = clip.origin, quotient(per_second, clip.fps)
+    old = origin.time_codes_per_second
+    if per_second == old and math.isclose(step, origin.time_codes_per_frame):
+        return clip
+    first = recounted_code(origin.first_time_code, old, per_second)
     origin = replace(
-        clip.origin,
+        origin,
         time_codes_per_second=per_second,
-        first_time_code=recounted_code(clip.origin.first_time_code, old, per_second),
-        time_codes_per_frame=quotient(per_second, clip.fps),
+        first_time_code=first,
+        time_codes_per_frame=step,
     )
     return replace(clip, origin=origin)
 

@@ -15,7 +15,7 @@ from usdhand.formats.usd.animation import author_animation
 from usdhand.formats.usd.names import author_names, legal_name, legal_skeleton
 from usdhand.formats.usd.stage import Character, compose
 from usdhand.motion import Clip, Skeleton
-from usdhand.motion.editing import counted_in_frames
+from usdhand.motion.editing import counted_in_frames, recounted
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
 from usdhand.motion.transforms import affine
 
@@ -47,7 +47,7 @@ def as_on_stage(clip: Clip, character: Character) -> Clip:
     for skeleton in (clip.skeleton, legal_skeleton(clip.skeleton)):
         if skeleton.joints[: len(own)] == own:
             named = replace(clip, skeleton=skeleton)
-            return _counted(named, character.stage.GetTimeCodesPerSecond())
+            return recounted(named, character.stage.GetTimeCodesPerSecond())
     raise InputError(
         f"{character.path}: the clip '{clip.name}' does not have the joints of "
         f"{character.skeleton.GetPath()}, which it is to be written over. Without a source "
@@ -85,22 +85,6 @@ def character_of(clip: Clip, *, up: str = "Y", animated: bool = True) -> Charact
 def gf_matrices(matrices: Array) -> Vt.Matrix4dArray:
     """USD's row-vector matrices of (n, 4, 4) column-vector ones."""
     return Vt.Matrix4dArray([Gf.Matrix4d(m.T.tolist()) for m in matrices])
-
-
-def _counted(clip: Clip, per_second: float) -> Clip:
-    """Return a clip whose time codes count so many a second."""
-    origin, step = clip.origin, per_second / clip.fps
-    if origin.time_codes_per_second == per_second and math.isclose(
-        origin.time_codes_per_frame, step
-    ):
-        return clip
-    origin = replace(
-        origin,
-        time_codes_per_second=per_second,
-        first_time_code=clip.start * per_second,
-        time_codes_per_frame=step,
-    )
-    return replace(clip, origin=origin)
 
 
 def _describe(stage: Usd.Stage, clip: Clip, up: str, animated: bool) -> None:
