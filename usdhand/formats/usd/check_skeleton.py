@@ -48,7 +48,7 @@ def _name_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
     double = [joint for joint, count in Counter(joints).items() if count > 1]
     if double:
         yield Problem("duplicate-joint", f"listed twice: {some(double)}", where, "error")
-    shared = [n for n, count in Counter(map(leaf_name, set(joints))).items() if count > 1]
+    shared = [n for n, count in Counter(map(leaf_name, dict.fromkeys(joints))).items() if count > 1]
     if shared:
         yield Problem(
             "duplicate-joint-name",
