@@ -115,7 +115,9 @@ def one_minute(folder: Path) -> Path:
 
 def chromium() -> tuple[Any, str]:
     """Playwright and the path of a browser; skips the test where there is none."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install it")
+    sync_api = pytest.importorskip(
+        "playwright.sync_api", reason="no playwright: pip install 'usdhand[test]'"
+    )
     path = os.environ.get("USDHAND_CHROMIUM", "/usr/bin/chromium")
     if not Path(path).exists():
         pytest.skip(f"no browser at {path}: set USDHAND_CHROMIUM to Chromium")

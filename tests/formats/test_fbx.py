@@ -23,7 +23,7 @@ from usdhand.formats.reading import Reading
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 
-pytest.importorskip("ufbx", reason="FBX needs the extra 'convert'")
+pytest.importorskip("ufbx", reason="no ufbx: pip install 'usdhand[convert]'")
 VECTORS = ("Lcl Translation", "Lcl Rotation", "PreRotation", "PostRotation")
 PIVOTS = ("RotationPivot", "RotationOffset", "ScalingPivot", "ScalingOffset")
 SWING: dict[tuple[str, str], Keys] = {("Lcl Rotation", "Z"): [(0.0, 0.0), (1.0, 90.0)]}

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pygltflib = pytest.importorskip("pygltflib", reason="the oracle reads with pygltflib")
+pygltflib = pytest.importorskip("pygltflib", reason="no pygltflib: pip install 'usdhand[test]'")
 
 FORMATS = {5120: "b", 5121: "B", 5122: "h", 5123: "H", 5125: "I", 5126: "f"}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}

@@ -33,7 +33,7 @@ def test_cost_and_path_are_the_oracles(seed: int, n: int, m: int) -> None:
     ("n", "m"), [(1, 1), (2, 2), (2, 3), (20, 30), (30, 20), (61, 47), (120, 120)]
 )
 def test_cost_is_that_of_dtw_python(n: int, m: int) -> None:
-    dtw = pytest.importorskip("dtw")
+    dtw = pytest.importorskip("dtw", reason="no dtw-python: pip install 'usdhand[dev]'")
     query, candidate = pair(n * m, n, m, 12)
     local = ((query[:, None] - candidate[None]) ** 2).sum(axis=2)
     theirs = dtw.dtw(local, step_pattern=dtw.typeIIIc)
