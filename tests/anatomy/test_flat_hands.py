@@ -305,7 +305,9 @@ def test_a_talk_on_a_tracked_hand(side: str) -> None:
     made = retarget_hands(talk, target)
     [hand] = find_hands(made).character.hands.values()
     theirs = turned_since_the_start(talk, find_hands(talk).character.hands[hand.side])
-    for name, angles in turned_since_the_start(made, hand).items():
+    ours = turned_since_the_start(made, hand)
+    assert set(ours) == set(hand.joints)
+    for name, angles in ours.items():
         assert_allclose(angles, theirs[name], atol=0.05)
     for digit in DIGITS:
         for above, joint in pairwise([hand.wrist, *line(hand, digit)]):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.blender import Y_UP, blender_python, turned
+from builders.real_takes import BVH_TAKES, USD_TAKES
 from conftest import REPOSITORY, shared_data
 
 import usdhand
@@ -20,17 +21,6 @@ from usdhand.motion import rotations as rot
 
 pytestmark = pytest.mark.blender
 TOLERANCE_DEG, TOLERANCE_CM = 0.02, 0.01
-REAL = [
-    "studiogalt/full/SG_ASL_7_2023_1_29.usdc",  # several roots
-    "studiogalt/mini/SG_ASL_10_Alt_2023_1_28.usdc",
-    "maya/HIK_Export.usda",
-]
-REAL_BVH = [
-    "animated-drawings/jesse_dance",
-    "animated-drawings/jumping_jacks",
-    "animated-drawings/wave_hello",
-    "performs/Idle",
-]
 
 
 def assert_blender_agrees(clip: Clip, file: Path, folder: Path, cm_per_unit: float = 1.0) -> None:
@@ -71,7 +61,7 @@ def test_samples_agree(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", USD_TAKES)
 def test_real_takes_agree(tmp_path: Path, name: str) -> None:
     clip = usdhand.read_clip(shared_data(*name.split("/")))
     write_clip(clip, tmp_path / "out.bvh")
@@ -79,9 +69,9 @@ def test_real_takes_agree(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("name", REAL_BVH)
+@pytest.mark.parametrize("name", BVH_TAKES)
 def test_real_files_are_read_as_blender_does(tmp_path: Path, name: str) -> None:
-    path = shared_data("bvh", *f"{name}.bvh".split("/"))
+    path = shared_data(*name.split("/"))
     clip = read_clip(path, Reading(up="Y"))
     cm = clip.origin.cm_per_unit
     # Blender's rest pose is the one of all channels zero, which need not be our bind pose.

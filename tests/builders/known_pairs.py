@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from builders.clips import frames_of
 
 from usdhand import find_hands, read_clip
 from usdhand.anatomy import Channels, Hands, Side
@@ -198,11 +199,5 @@ def natural_offset(a: Clip, b: Clip, hands_a: Hands, hands_b: Hands) -> tuple[in
 
 def _cut(clip: Clip, first: int, count: int) -> Clip:
     o = clip.origin
-    span = slice(first, first + count)
-    return replace(
-        clip,
-        rotations=clip.rotations[span],
-        translations=clip.translations[span],
-        scales=clip.scales[span],
-        origin=replace(o, first_time_code=o.first_time_code + first * o.time_codes_per_frame),
-    )
+    start = replace(o, first_time_code=o.first_time_code + first * o.time_codes_per_frame)
+    return replace(frames_of(clip, slice(first, first + count)), origin=start)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.cli_runner import run
+from builders.clips import frames_of
 from conftest import REPOSITORY, shared_data
 
 from usdhand import find_hands, read_character, read_clip
@@ -54,14 +55,7 @@ def test_round_trips_from_usd(tmp_path: Path, suffix: str) -> None:
     run("convert", TALK, "-o", other, "--trim", "100:220")
     run("convert", other, "-o", back)
     a, b = read_clip(TALK), read_clip(back)
-    part = slice(99, 220)
-    a = replace(
-        a,
-        rotations=a.rotations[part],
-        translations=a.translations[part],
-        scales=a.scales[part],
-        origin=replace(a.origin, first_time_code=100.0),
-    )
+    a = replace(frames_of(a, slice(99, 220)), origin=replace(a.origin, first_time_code=100.0))
     assert_same_motion(a, b, time=suffix != "bvh")
     assert not [f for f in check_file(back) if f.severity == "error"]
     # Fingers mean the same, since the bind pose survives.
@@ -111,7 +105,7 @@ def files_of_other_formats() -> list[str]:
 def test_real_files_become_characters(tmp_path: Path, name: str) -> None:
     source = shared_data(*name.split("/"))
     if source.suffix == ".fbx":
-        pytest.importorskip("ufbx", reason="FBX needs the extra 'convert'")
+        pytest.importorskip("ufbx", reason="no ufbx: pip install 'usdhand[convert]'")
     target = tmp_path / "out.usdc"
     data = json.loads(run("convert", source, "-o", target, "--json", "-q").output)
     [file] = data["files"]
@@ -126,7 +120,7 @@ def test_real_files_become_characters(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.real_data
 def test_all_takes_of_a_file_are_written(tmp_path: Path) -> None:
-    pytest.importorskip("ufbx", reason="FBX needs the extra 'convert'")
+    pytest.importorskip("ufbx", reason="no ufbx: pip install 'usdhand[convert]'")
     takes = sorted(shared_data("studiogalt", "fbx").glob("*_7_*Full.fbx"))
     names = animation_names(takes[0])
     assert len(names) > 1
@@ -140,7 +134,7 @@ def test_all_takes_of_a_file_are_written(tmp_path: Path) -> None:
 def test_a_file_of_several_takes_is_inspected_and_can_get_fingers(
     tmp_path: Path, library: Path
 ) -> None:
-    pytest.importorskip("ufbx", reason="FBX needs the extra 'convert'")
+    pytest.importorskip("ufbx", reason="no ufbx: pip install 'usdhand[convert]'")
     take = sorted(shared_data("studiogalt", "fbx").glob("*_7_*Full.fbx"))[0]
     names = animation_names(take)
     text = run("inspect", take).output

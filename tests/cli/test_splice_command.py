@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.clips import frames_of
 from click.testing import CliRunner, Result
 from conftest import REPOSITORY
 from pxr import Usd
@@ -214,10 +215,11 @@ def test_lengths_decide_whatever_the_band() -> None:
     body, full = read_clip(BODY), read_clip(FULL)
     for count in (10, 27):
         with pytest.raises(UsageError, match=r"factor of 3\.3 apart"):
-            splice_hands(body, frames(full, slice(0, count)))
+            splice_hands(body, frames_of(full, slice(0, count)))
     ours, theirs = (read_clip(SAMPLES / "gestures" / f"ok_0{k}.usdc") for k in (1, 2))
     for band in (0.05, 0.3, 1.0):
-        assert splice_hands(ours, theirs, SpliceSettings(band=(band, 0.1))).hands
+        result = splice_hands(ours, theirs, SpliceSettings(band=(band, 0.1)))
+        assert set(result.hands) == {"left", "right"}
 
 
 def test_fingers_that_do_not_move(run: Run, tmp_path: Path) -> None:
@@ -264,8 +266,3 @@ def test_pins_tell_the_timing_of_arms_that_rest() -> None:
         assert np.interp(299 / 30, *alignment.warp.T) == pytest.approx(349 / 30)
     one = splice_hands(full, still, pins=["left:1:1", "left:680:680"])
     assert one.hands["right"].taken_from == "left"
-
-
-def frames(clip: Clip, part: slice) -> Clip:
-    q, t, s = (v[part] for v in (clip.rotations, clip.translations, clip.scales))
-    return replace(clip, rotations=q, translations=t, scales=s)

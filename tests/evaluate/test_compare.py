@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.clips import frames_of
 from builders.moving_hands import hand_map, moved, random_turns, skeleton
 from builders.rigs import METACARPALS, parents
 from hypothesis import given, settings
@@ -35,16 +36,6 @@ def take(frames: int = 90, seed: int = 4, rig: Skeleton = RIG, index: dict = IND
 
 def compared(a: Clip, b: Clip, align: bool = False) -> Comparison:
     return compare_clips(a, b, hands_of(a), hands_of(b), align)
-
-
-def cut(clip: Clip, first: int, last: int | None = None) -> Clip:
-    span = slice(first, last)
-    return replace(
-        clip,
-        rotations=clip.rotations[span],
-        translations=clip.translations[span],
-        scales=clip.scales[span],
-    )
 
 
 def test_a_motion_equals_itself() -> None:
@@ -100,7 +91,8 @@ def test_a_difference_is_the_shorter_way_round() -> None:
 @pytest.mark.parametrize("late", [-7, 0, 12])
 def test_whole_frames_of_lag_are_found_and_undone(late: int) -> None:
     whole = take(140)
-    a, b = cut(whole, max(late, 0), 100 + late), cut(whole, max(-late, 0), 100)
+    a = frames_of(whole, slice(max(late, 0), 100 + late))
+    b = frames_of(whole, slice(max(-late, 0), 100))
     found = compared(a, b)
     assert found.lag == pytest.approx(late / 30.0, abs=0.01 / 30.0)
     aligned = compared(a, b, align=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.cli_runner import run
+from builders.clips import frames_of
 from conftest import REPOSITORY, shared_data
 
 import usdhand
@@ -144,14 +145,6 @@ def test_an_excerpt_is_the_same_performance(frames: slice) -> None:
     whole = [usdhand.read_clip(TALKS / f"talk_0{i}_full.usdc") for i in (1, 2, 3)]
     hands = usdhand.find_hands(whole[0])
 
-    def piece(clip: Clip) -> Clip:
-        return replace(
-            clip,
-            rotations=clip.rotations[frames],
-            translations=clip.translations[frames],
-            scales=clip.scales[frames],
-        )
-
     def arms(clip: Clip) -> dict[Side, ArmMotion]:
         return {s: at_arm_rate(arm_motion(clip, hands, s), clip.fps) for s in hands.frames}
 
@@ -159,8 +152,8 @@ def test_an_excerpt_is_the_same_performance(frames: slice) -> None:
         made = (library_clip(c, hands, Segmentation(), path="", content_hash="") for c in clips)
         return MotionLibrary(tuple(made))
 
-    assert same_motion(library(whole), arms(piece(whole[0])), None) == [0]
-    assert same_motion(library([piece(c) for c in whole]), arms(whole[1]), None) == [1]
+    assert same_motion(library(whole), arms(frames_of(whole[0], frames)), None) == [0]
+    assert same_motion(library([frames_of(c, frames) for c in whole]), arms(whole[1]), None) == [1]
 
 
 @pytest.mark.real_data

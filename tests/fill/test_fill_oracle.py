@@ -71,7 +71,7 @@ def test_best_path_is_the_first_of_all(seed: int, layers: int) -> None:
 @given(seeds, st.integers(1, 30))
 @settings(max_examples=30)
 def test_best_path_is_dijkstras(seed: int, layers: int) -> None:
-    networkx = pytest.importorskip("networkx", reason="networkx is in the dev extra")
+    networkx = pytest.importorskip("networkx", reason="no networkx: pip install 'usdhand[test]'")
     nodes, edges = layered(seed, layers, 6)
     graph = networkx.DiGraph()
     for i, n in enumerate(nodes[0]):

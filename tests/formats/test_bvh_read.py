@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.bvh_files import ARM, edited, plain_positions, written
+from builders.real_takes import BVH_TAKES
 from conftest import REPOSITORY, shared_data
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,18 +25,12 @@ from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.rigs import map_character
 
-REAL = [
-    "animated-drawings/jesse_dance",
-    "animated-drawings/jumping_jacks",
-    "animated-drawings/wave_hello",
-    "performs/Idle",
-]
 NEAR_CM = 0.001  # 0.01 mm
 CHANNELS = "CHANNELS 3 Zrotation Xrotation Yrotation\n    JOINT"
 
 
 def real(name: str) -> Path:
-    return shared_data("bvh", *f"{name}.bvh".split("/"))
+    return shared_data(*name.split("/"))
 
 
 def positions(clip: Clip) -> np.ndarray:
@@ -54,7 +49,7 @@ def codes(clip: Clip) -> set[str]:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", BVH_TAKES)
 def test_real_files_agree_with_a_plain_reading(name: str) -> None:
     clip = as_is(real(name))
     frames = np.unique(np.linspace(0, len(clip) - 1, 12).astype(int))
@@ -63,7 +58,7 @@ def test_real_files_agree_with_a_plain_reading(name: str) -> None:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", BVH_TAKES)
 def test_real_files_agree_with_a_published_reader(name: str, tmp_path: Path) -> None:
     python = os.environ.get("USDHAND_BVH_PYTHON")
     if python is None and importlib.util.find_spec("pybvh"):
@@ -81,21 +76,21 @@ def test_real_files_agree_with_a_published_reader(name: str, tmp_path: Path) -> 
 @pytest.mark.real_data
 def test_what_real_files_do_not_say_is_guessed() -> None:
     found = {}
-    for name in REAL:
+    for name in BVH_TAKES:
         clip = read_clip(real(name))
         assert {"guessed-units", "guessed-up-axis"} <= codes(clip)
         found[name] = (clip.origin.cm_per_unit, clip.origin.up_axis, round(clip.fps, 2))
     cmu = pytest.approx(5.644, abs=1e-3)
     assert found == {
-        "animated-drawings/jesse_dance": (1.0, "Y", 100.0),
-        "animated-drawings/jumping_jacks": (cmu, "Y", 30.0),
-        "animated-drawings/wave_hello": (cmu, "Z", 119.88),
-        "performs/Idle": (100.0, "Y", 30.0),
+        "bvh/animated-drawings/jesse_dance.bvh": (1.0, "Y", 100.0),
+        "bvh/animated-drawings/jumping_jacks.bvh": (cmu, "Y", 30.0),
+        "bvh/animated-drawings/wave_hello.bvh": (cmu, "Z", 119.88),
+        "bvh/performs/Idle.bvh": (100.0, "Y", 30.0),
     }
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", BVH_TAKES)
 def test_bodies_stand_upright_at_the_bind_pose(name: str) -> None:
     skeleton = read_clip(real(name)).skeleton
     heights = dict(zip(skeleton.names, skeleton.bind_positions[:, 1], strict=True))
@@ -107,14 +102,14 @@ def test_bodies_stand_upright_at_the_bind_pose(name: str) -> None:
 
 @pytest.mark.real_data
 def test_a_zero_pose_that_is_no_body_is_not_the_bind_pose() -> None:
-    clip = read_clip(real("animated-drawings/jesse_dance"))  # all limbs along X
+    clip = read_clip(real("bvh/animated-drawings/jesse_dance.bvh"))  # all limbs along X
     assert "zero-pose" in codes(clip)
     assert np.allclose(clip.skeleton.bind_positions, positions(clip)[0])
-    assert "zero-pose" not in codes(read_clip(real("performs/Idle")))
+    assert "zero-pose" not in codes(read_clip(real("bvh/performs/Idle.bvh")))
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("name", ["animated-drawings/jesse_dance", "performs/Idle"])
+@pytest.mark.parametrize("name", ["bvh/animated-drawings/jesse_dance.bvh", "bvh/performs/Idle.bvh"])
 def test_hands_of_real_files_are_found_with_their_tips(name: str) -> None:
     skeleton = read_clip(real(name)).skeleton
     hands = map_character(skeleton).hands
@@ -129,7 +124,7 @@ def test_hands_of_real_files_are_found_with_their_tips(name: str) -> None:
 @pytest.mark.real_data
 def test_a_thumb_alone_is_no_hand() -> None:
     with pytest.raises(HandNotFoundError):
-        map_character(read_clip(real("animated-drawings/jumping_jacks")).skeleton)
+        map_character(read_clip(real("bvh/animated-drawings/jumping_jacks.bvh")).skeleton)
 
 
 # --- grammar -------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.bvh_files import ARM, plain_positions, written
+from builders.real_takes import BVH_TAKES, USD_TAKES
 from conftest import REPOSITORY, shared_data
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -25,17 +26,6 @@ from usdhand.rigs import map_character
 NEAR_CM, NEAR_DEG = 0.01, 0.01
 SAMPLES = ["gestures/ok_02", "gestures_ben/wipe_01", "conversations/talk_01_full"]
 SAMPLES += ["hands/talk_01_hands_a", "hands/talk_01_hands_right"]
-REAL = [
-    "studiogalt/full/SG_ASL_7_2023_1_29.usdc",
-    "studiogalt/mini/SG_ASL_10_Alt_2023_1_28.usdc",
-    "maya/HIK_Export.usda",
-]
-REAL_BVH = [
-    "animated-drawings/jesse_dance",
-    "animated-drawings/jumping_jacks",
-    "animated-drawings/wave_hello",
-    "performs/Idle",
-]
 
 
 def away_from_bind(clip: Clip, joints: list[int]) -> np.ndarray:
@@ -81,7 +71,7 @@ def test_samples_come_back(tmp_path: Path, name: str, up: str) -> None:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", USD_TAKES)
 def test_real_takes_come_back(tmp_path: Path, name: str) -> None:
     clip = usdhand.read_clip(shared_data(*name.split("/")))
     back, problems = there_and_back(clip, tmp_path)  # units and axes guessed from our own file
@@ -94,9 +84,9 @@ def test_real_takes_come_back(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.real_data
 @pytest.mark.parametrize("up", ["Y", "Z"])
-@pytest.mark.parametrize("name", REAL_BVH)
+@pytest.mark.parametrize("name", BVH_TAKES)
 def test_real_files_come_back(tmp_path: Path, name: str, up: str) -> None:
-    clip = read_clip(shared_data("bvh", *f"{name}.bvh".split("/")))
+    clip = read_clip(shared_data(*name.split("/")))
     back, _ = there_and_back(clip, tmp_path)
     assert_same(clip, back)
     write_clip(clip, tmp_path / "out.bvh", up=up)
@@ -107,7 +97,7 @@ def test_real_files_come_back(tmp_path: Path, name: str, up: str) -> None:
 
 @pytest.mark.real_data
 def test_hands_are_found_again(tmp_path: Path) -> None:
-    clip = usdhand.read_clip(shared_data(*REAL[0].split("/")))
+    clip = usdhand.read_clip(shared_data(*USD_TAKES[0].split("/")))
     back, _ = there_and_back(clip, tmp_path)
 
     def names(which: Clip) -> dict[str, dict[str, str]]:

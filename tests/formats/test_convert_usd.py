@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from builders import stages
 from builders.cli_runner import run
+from builders.clips import joints_of
 from conftest import REPOSITORY, shared_data
 from oracles.usdskel import assert_same_world
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
@@ -154,13 +155,7 @@ def test_names_become_legal_and_joints_follow_their_parents() -> None:
         rest=a.skeleton.rest[:7],
         aliases=(*"abcdef", "hips"),
     )
-    clip = replace(
-        a,
-        skeleton=skeleton,
-        rotations=a.rotations[:, :7],
-        translations=a.translations[:, :7],
-        scales=a.scales[:, :7],
-    )
+    clip = joints_of(a, slice(7), skeleton)
     b = legal_clip(clip)
     assert b.skeleton.joints[0] == "Root"
     assert b.skeleton.joints[1:4] == ("Root/a_b", "Root/a_b_2", "Root/a_b_3")
@@ -203,15 +198,8 @@ def test_hands_that_share_no_side_are_refused() -> None:
         bind=body.skeleton.bind[left],
         rest=body.skeleton.rest[left],
     )
-    body = replace(
-        body,
-        skeleton=skeleton,
-        rotations=body.rotations[:, left],
-        translations=body.translations[:, left],
-        scales=body.scales[:, left],
-    )
     with pytest.raises(HandNotFoundError, match="no hand in common"):
-        retarget_hands(right, body)
+        retarget_hands(right, joints_of(body, left, skeleton))
 
 
 @pytest.mark.real_data

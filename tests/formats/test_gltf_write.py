@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import struct
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.blender import blender_python
+from builders.clips import frames_of, joints_of
+from builders.real_takes import USD_TAKES
 from conftest import REPOSITORY, shared_data
 
 import usdhand
@@ -24,11 +25,6 @@ from usdhand.motion import rotations as rot
 
 CLOSE_CM, CLOSE_DEG = 1e-2, 1e-2  # 0.1 mm, a hundredth of a degree
 SAMPLES = ("gestures/ok_02", "gestures_ben/wipe_01", "conversations/talk_01_full")
-TAKES = (
-    ("studiogalt", "full", "SG_ASL_7_2023_1_29.usdc"),
-    ("studiogalt", "mini", "SG_ASL_10_Alt_2023_1_28.usdc"),
-    ("maya", "HIK_Export.usda"),
-)
 
 
 def sample(name: str = SAMPLES[0]) -> Clip:
@@ -83,9 +79,9 @@ def test_samples_come_back(name: str, suffix: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize("take", TAKES)
-def test_real_takes_come_back(take: tuple[str, ...], tmp_path: Path) -> None:
-    assert_comes_back(usdhand.read_clip(shared_data(*take)), tmp_path / "take.glb")
+@pytest.mark.parametrize("take", USD_TAKES)
+def test_real_takes_come_back(take: str, tmp_path: Path) -> None:
+    assert_comes_back(usdhand.read_clip(shared_data(*take.split("/"))), tmp_path / "take.glb")
 
 
 def test_what_stands_still_is_written_once(tmp_path: Path) -> None:
@@ -110,13 +106,7 @@ def test_what_stands_still_is_written_once(tmp_path: Path) -> None:
 
 def test_a_clip_that_never_moves_keeps_its_length(tmp_path: Path) -> None:
     clip = sample()
-    still = replace(
-        clip,
-        rotations=np.repeat(clip.rotations[:1], 40, axis=0),
-        translations=np.repeat(clip.translations[:1], 40, axis=0),
-        scales=np.broadcast_to(clip.scales[0], (40, *clip.scales.shape[1:])),
-    )
-    assert_comes_back(still, tmp_path / "take.glb")
+    assert_comes_back(frames_of(clip, np.zeros(40, int)), tmp_path / "take.glb")
 
 
 def test_scales_come_back(tmp_path: Path) -> None:
@@ -150,14 +140,7 @@ def test_several_roots_and_parents_after_children(tmp_path: Path) -> None:
         clip.skeleton.bind[order],
         clip.skeleton.rest[order],
     )
-    turned = replace(
-        clip,
-        skeleton=skeleton,
-        rotations=clip.rotations[:, order],
-        translations=clip.translations[:, order],
-        scales=clip.scales[:, order],
-    )
-    assert_comes_back(turned, tmp_path / "take.glb")
+    assert_comes_back(joints_of(clip, order, skeleton), tmp_path / "take.glb")
 
 
 # -- times --------------------------------------------------------------------------------------
@@ -224,15 +207,6 @@ def test_another_library_reads_it(tmp_path: Path) -> None:
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # Blender is Z up
 
 
-def blender_python() -> str:
-    chosen = os.environ.get("USDHAND_BLENDER_PYTHON")
-    if chosen:
-        return chosen
-    if importlib.util.find_spec("bpy"):
-        return sys.executable
-    pytest.skip("no Blender: set USDHAND_BLENDER_PYTHON to a Python with bpy 5.0")
-
-
 def assert_same_in_blender(clip: Clip, path: Path, tmp_path: Path) -> None:
     """Blender makes an armature of all joints that moves as the clip does."""
     index = np.unique(np.linspace(0, len(clip) - 1, 8).astype(int))
@@ -275,8 +249,8 @@ def test_blender_makes_an_armature(name: str, suffix: str, tmp_path: Path) -> No
 
 @pytest.mark.blender
 @pytest.mark.real_data
-@pytest.mark.parametrize("take", TAKES)
-def test_blender_shows_real_takes(take: tuple[str, ...], tmp_path: Path) -> None:
-    clip = usdhand.read_clip(shared_data(*take))
+@pytest.mark.parametrize("take", USD_TAKES)
+def test_blender_shows_real_takes(take: str, tmp_path: Path) -> None:
+    clip = usdhand.read_clip(shared_data(*take.split("/")))
     write_clip(clip, tmp_path / "take.glb")
     assert_same_in_blender(clip, tmp_path / "take.glb", tmp_path)

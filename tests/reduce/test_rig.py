@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.clips import frames_of
 from builders.moving_hands import hand_map, moved, random_turns, skeleton
 from hypothesis import given
 from hypothesis import strategies as st
@@ -156,14 +157,8 @@ def test_expanding_onto_another_hand_gives_the_same_channels() -> None:
 
 def test_what_cannot_be_fitted_or_applied() -> None:
     clip, hands = take(1)
-    short = replace(
-        clip,
-        rotations=clip.rotations[:1],
-        translations=clip.translations[:1],
-        scales=clip.scales[:1],
-    )
     with pytest.raises(InputError, match="one frame"):
-        fit_rig([short], [hands], Target(PRESETS[4]))
+        fit_rig([frames_of(clip, slice(1))], [hands], Target(PRESETS[4]))
     with pytest.raises(UsageError, match="least-squares"):
         fit_rig([clip], [hands], Target(PRESETS[4]), "paper", most_controllers=2)
     left = replace(hands, frames={"left": hands.frames["left"]})

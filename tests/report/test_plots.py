@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.cli_runner import run
+from builders.clips import frames_of
 from conftest import REPOSITORY
 
 import usdhand
@@ -43,15 +43,6 @@ GESTURES = [SAMPLES / "gestures" / f"{x}.usdc" for x in ("ok_01", "ok_02", "big_
 PINS = ("1:1", "181:403")
 
 
-def part_of(clip: Clip, frames: slice) -> Clip:
-    return replace(
-        clip,
-        rotations=clip.rotations[frames],
-        translations=clip.translations[frames],
-        scales=clip.scales[frames],
-    )
-
-
 def lines(panel: Any) -> dict[str, Any]:
     """Lines of a panel by their label."""
     return {line.get_label(): line.get_xydata() for line in panel.get_lines()}
@@ -81,7 +72,7 @@ def library(library_file: Path) -> MotionLibrary:
 
 @pytest.fixture(scope="module")
 def body() -> Clip:
-    return part_of(usdhand.read_clip(BODY), slice(0, 240))
+    return frames_of(usdhand.read_clip(BODY), slice(0, 240))
 
 
 @pytest.fixture(scope="module")
@@ -261,7 +252,7 @@ def test_speed_and_borders(filled: Filled, body: Clip) -> None:
 
 def test_a_long_clip_is_shown_in_rows_of_its_first_minute(library: MotionLibrary) -> None:
     clip = usdhand.read_clip(BODY)
-    long = part_of(clip, np.tile(np.arange(len(clip)), 4))  # type: ignore[arg-type]
+    long = frames_of(clip, np.tile(np.arange(len(clip)), 4))
     part = fill_api.fill_fingers(long, library, sides=("left",)).parts[0]
     figure = filling.speed(part, long, usdhand.find_hands(long))
     assert len(figure.axes) == filling.MOST_ROWS
@@ -299,7 +290,7 @@ def test_graph_has_costs_and_the_cheapest_path(filled: Filled, library: MotionLi
 
 
 def test_one_segment_has_room_for_its_caption(body: Clip, library: MotionLibrary) -> None:
-    short = part_of(body, slice(0, 8))
+    short = frames_of(body, slice(0, 8))
     part = fill_api.fill_fingers(short, library, FillSettings(k=1), sides=("left",)).parts[0]
     assert len(part.alternatives[0].choices) == 1
     figure = filling.graph(part, library)

@@ -83,7 +83,9 @@ def test_names_are_no_formulas(tmp_path: Path) -> None:
     agreement = Agreement("$near$", labels, 0.5, np.eye(3), 10)
     figures = evaluating.figures([agreement], [])
     style.write_plots(tmp_path, figures, force=False)
-    for path in tmp_path.glob("*.svg"):
+    drawn = sorted(tmp_path.glob("*.svg"))
+    assert len(drawn) == len(figures) > 0
+    for path in drawn:
         ElementTree.parse(path)
 
 

@@ -62,6 +62,7 @@ def test_every_spelled_out_name_is_in_the_table(rig: str) -> None:
 @pytest.mark.parametrize("convention", load_conventions().conventions, ids=lambda c: c.name)
 def test_no_name_stands_for_two_joints(convention: Convention) -> None:
     seen: dict[str, tuple[object, str]] = {}
+    assert set(convention.hand_keys) in ({None}, set(SIDES))
     for side, roles in convention.hand_keys.items():
         assert set(HAND_JOINTS) <= set(roles)
         for role, keys in roles.items():

@@ -100,7 +100,9 @@ def test_end_sites_of_bvh(rig: str) -> None:
 @pytest.mark.parametrize("rig", ["mixamo", "humanik", "zeroeggs", "beat", "advanced_skeleton"])
 def test_a_fourth_segment_is_the_tip(rig: str) -> None:
     skeleton, expected = build(RIGS[rig])
-    for side, hand in map_character(skeleton).hands.items():
+    hands = map_character(skeleton).hands
+    assert set(hands) == set(SIDES)
+    for side, hand in hands.items():
         assert hand.tips == {d: expected[side, d + "Tip"] for d in DIGITS}
         assert all(skeleton.names[j][-2:] != "4" for j in hand.joints.values())
 

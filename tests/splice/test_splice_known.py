@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from builders.clips import frames_of
 from builders.known_pairs import (
     Pair,
     arms_only,
@@ -19,7 +20,7 @@ from builders.known_pairs import (
 from conftest import REPOSITORY, shared_data
 
 from usdhand import find_hands, read_clip
-from usdhand.anatomy import Side
+from usdhand.anatomy import SIDES, Side
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
@@ -53,6 +54,7 @@ def spliced(pair: Pair, settings: SpliceSettings | None = None) -> Spliced:
 def check(pair: Pair) -> None:
     result = spliced(pair)
     true = pair.source_channels()
+    assert set(result.hands) == set(SIDES)
     for side, alignment in result.hands.items():
         moving = pair.moving(side)
         full = np.abs(pair.error(alignment.warp[:, 1])[moving])
@@ -117,6 +119,7 @@ def test_both_rigs_of_a_take_within_a_frame_without_being_told(name: str) -> Non
     first, second = natural_offset(a, b, hands_a, hands_b)
     result = splice(a, b, hands_a, hands_b)
     pair = Pair(name, a, b, hands_a, hands_b, b, np.empty(0))
+    assert set(result.hands) == set(SIDES)
     for side, alignment in result.hands.items():
         frames = np.flatnonzero(pair.moving(side))
         off = alignment.warp[frames, 1] * b.fps - (frames - first + second)
@@ -189,6 +192,7 @@ def test_true_pins_do_no_harm() -> None:
     at = np.linspace(0, len(pair.body) - 1, 10).astype(int)[1:-1]
     pins = tuple(Pin(t / pair.body.fps, pair.truth[t]) for t in at)
     free, pinned = spliced(pair).hands, spliced(pair, SpliceSettings(pins=pins)).hands
+    assert set(free) == set(SIDES)
     for side, moving in ((s, pair.moving(s)) for s in free):
         before, after = (np.abs(pair.error(h[side].warp[:, 1])[moving]) for h in (free, pinned))
         assert np.median(after) < np.median(before) + 0.0005
@@ -201,13 +205,12 @@ def test_true_pins_around_frames_that_were_held(count: int) -> None:
     folder = SAMPLES / "conversations"
     body, full = read_clip(folder / "talk_01_body.usdc"), read_clip(folder / "talk_01_full.usdc")
     at = np.concatenate([np.arange(300), np.arange(300 - count, len(full))])
-    longer = replace(
-        full,
-        **{k: getattr(full, k)[at] for k in ("rotations", "translations", "scales")},
-    )
+    longer = frames_of(full, at)
     pins = ["300:300", f"301:{301 + count}"]
     true = np.arange(len(body)) + np.where(np.arange(len(body)) < 300, 0, count)
-    for alignment in splice_hands(body, longer, pins=pins).hands.values():
+    found = splice_hands(body, longer, pins=pins).hands
+    assert set(found) == set(SIDES)
+    for alignment in found.values():
         off = np.abs(alignment.warp[:, 1] * full.fps - true) / full.fps
         assert off.max() < VISIBLE_S
 
@@ -242,7 +245,9 @@ def test_every_frame_pinned_is_full_control() -> None:
     )
     end = pair.hands.duration
     pins = tuple(replace(p, hand=min(p.hand, end)) for p in pins)
-    for alignment in spliced(pair, SpliceSettings(pins=pins)).hands.values():
+    found = spliced(pair, SpliceSettings(pins=pins)).hands
+    assert set(found) == set(SIDES)
+    for alignment in found.values():
         assert np.abs(alignment.warp[:, 1] - [p.hand for p in pins]).max() < 1e-9
 
 
@@ -386,6 +391,7 @@ def _scaled(matrices: np.ndarray) -> np.ndarray:
 def test_a_turned_clip_is_aligned_as_well(how: str) -> None:
     pair = sample()
     result = spliced(pair, SpliceSettings(align=how))  # type: ignore[arg-type]
+    assert set(result.hands) == set(SIDES)
     for side, alignment in result.hands.items():
         error = np.abs(pair.error(alignment.warp[:, 1])[pair.moving(side)])
         assert np.median(error) < 0.025
