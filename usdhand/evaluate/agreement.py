@@ -80,8 +80,9 @@ def label_agreement(
             f"The library has {len(labels)} labels; at least two are needed. Name files "
             "LABEL_NUMBER, or give --labels FILE.csv to 'library build'."
         )
+    number_of = {label: number for number, label in enumerate(labels)}
     gestures = [
-        (arm, labels.index(clip.label), number)
+        (arm, number_of[clip.label], number)
         for number, clip in enumerate(library.clips)
         if clip.label
         for arm in _gesturing_arms(clip)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from usdhand.anatomy.channels import Hands
 from usdhand.display import displayed
 from usdhand.errors import UsageError
-from usdhand.motion import Clip, leaf_name
+from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.motion.rotations import Array
@@ -181,18 +181,19 @@ def _at_rate(curves: Array, fps: float, wanted: float) -> Array:
 
 def _joint_angles(a: Clip, b: Clip, span: slice, at_b: Array) -> tuple[tuple[str, ...], Array]:
     """Angle (frames, n) between local rotations of joints with the same, unique name."""
-    names = [n for n in _unique(a.skeleton.names) if n in set(_unique(b.skeleton.names))]
-    in_a = [a.skeleton.names.index(n) for n in names]
-    in_b = [b.skeleton.names.index(n) for n in names]
+    joints_a, joints_b = _unique_joints(a.skeleton), _unique_joints(b.skeleton)
+    names = [name for name in joints_a if name in joints_b]
     if not names:
         return (), np.empty((len(at_b), 0))
+    in_a, in_b = [joints_a[n] for n in names], [joints_b[n] for n in names]
     other = interpolate_rotations(b.rotations[:, in_b], at_b)
     return tuple(names), rot.angle_between(a.rotations[span, in_a], other)
 
 
-def _unique(names: Sequence[str]) -> list[str]:
-    leaves = [leaf_name(n) for n in names]
-    return [n for n in leaves if leaves.count(n) == 1]
+def _unique_joints(skeleton: Skeleton) -> dict[str, int]:
+    """Joints by their leaf names, those whose name no other joint has."""
+    count = Counter(skeleton.names)
+    return {name: joint for joint, name in enumerate(skeleton.names) if count[name] == 1}
 
 
 def _common_tips(a: Clip, b: Clip, hands_a: Hands, hands_b: Hands) -> tuple[Array, Array]:

@@ -157,8 +157,8 @@ def _search(
     factor: float,
     exclude: Sequence[int],
 ) -> list[list[Candidate]]:
-    groups = np.tile(np.array(list(exclude) or [-1], np.int32), (len(queries), 1))
     asked = pack(queries)
+    groups = np.array(exclude, np.int32)
     matches = search(space.index, asked, k=count, max_ratio=factor, exclude=groups)
     rows, columns = np.nonzero(matches.ids >= 0)
     segments_found = matches.ids[rows, columns]

@@ -15,6 +15,7 @@ from usdhand.fill.arm import ArmMotion, arm_motion, is_still
 from usdhand.fill.assemble import Piece, join, limited, soften_seams
 from usdhand.fill.candidates import (
     Candidate,
+    FingerSource,
     SearchSpace,
     find_candidates,
     finger_curves,
@@ -252,7 +253,7 @@ def _fill_part(
         n for side, own in zip(part, joints, strict=True) for n in all_channels(side, own)
     )
     rows = part_rows(arms, space.metric)
-    sources = finger_sources(library, part, joints, usable)
+    sources: dict[int, FingerSource] = {}
     others = [i for i in range(len(library.clips)) if i not in usable]
     borders = _body_frames(cut, fps, frames)
     found: list[list[Candidate]] = []
@@ -262,6 +263,8 @@ def _fill_part(
         queries = [rows[a : b + 1] for a, b in cut[some]]
         count = max(settings.k, settings.pool)
         found += find_candidates(queries, space, count, settings.factor, others)
+        used = {int(space.clips[c.segment]) for candidates in found[some] for c in candidates}
+        sources |= finger_sources(library, part, joints, used - sources.keys())
         curves += [
             finger_curves(candidates, space, sources, np.arange(b - a + 1) / fps)
             for (a, b), candidates in zip(borders[some], found[some], strict=True)

@@ -101,12 +101,13 @@ class Skeleton:
 
     @cached_property
     def order(self) -> tuple[int, ...]:
-        """Joint indices with every parent before its children."""
-        return tuple(sorted(range(len(self)), key=self.depth))
-
-    def depth(self, joint: int) -> int:
-        """Return the number of ancestors of a joint."""
-        return len(self.ancestors(joint))
+        """Joint indices by depth, so that every parent comes before its children."""
+        found: list[int] = []
+        level = np.flatnonzero(self.parents < 0).tolist()
+        while level:
+            found += level
+            level = sorted(child for joint in level for child in self.children[joint])
+        return tuple(found)
 
     def ancestors(self, joint: int) -> tuple[int, ...]:
         """Return the joints above ``joint``, the parent first."""
@@ -115,11 +116,22 @@ class Skeleton:
             found.append(joint)
         return tuple(found)
 
+    def descendants(self, joint: int) -> tuple[int, ...]:
+        """Return the joints below ``joint``, branch by branch."""
+        found: list[int] = []
+        open_joints = list(reversed(self.children[joint]))
+        while open_joints:
+            found.append(open_joints.pop())
+            open_joints.extend(reversed(self.children[found[-1]]))
+        return tuple(found)
+
     def with_ancestors(self, joints: Iterable[int]) -> tuple[int, ...]:
         """Return ``joints`` and all joints above them, every parent before its children."""
-        wanted = set(joints)
-        for joint in tuple(wanted):
-            wanted.update(self.ancestors(joint))
+        wanted: set[int] = set()
+        for joint in joints:
+            while joint >= 0 and joint not in wanted:
+                wanted.add(joint)
+                joint = int(self.parents[joint])
         return tuple(j for j in self.order if j in wanted)
 
     def common_ancestor(self, joints: Iterable[int]) -> int | None:

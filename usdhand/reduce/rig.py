@@ -114,24 +114,24 @@ def evaluation_order(relations: Sequence[Relation]) -> tuple[Relation, ...]:
     """
     by_name = {r.name: r for r in relations}
     done: dict[str, Relation] = {}
-
-    def visit(relation: Relation, above: tuple[str, ...]) -> None:
-        if relation.name in above:
-            circle = " -> ".join((*above[above.index(relation.name) :], relation.name))
-            raise InputError(f"The rig's channels control each other in a circle: {circle}.")
-        if relation.name in done:
-            return
-        for controller in relation.controllers:
-            if controller not in by_name:
-                raise InputError(
-                    f"Channel '{relation.name}' follows '{controller}', "
-                    "which the rig does not have."
-                )
-            visit(by_name[controller], (*above, relation.name))
-        done[relation.name] = relation
-
     for relation in relations:
-        visit(relation, ())
+        chain = {} if relation.name in done else {relation.name: iter(relation.controllers)}
+        while chain:  # from a channel to its controllers, to theirs, and so on
+            name = next(reversed(chain))
+            controller = next(chain[name], None)
+            if controller is None:
+                done[name] = by_name[name]
+                del chain[name]
+            elif controller not in by_name:
+                raise InputError(
+                    f"Channel '{name}' follows '{controller}', which the rig does not have."
+                )
+            elif controller in chain:
+                names = list(chain)
+                circle = " -> ".join([*names[names.index(controller) :], controller])
+                raise InputError(f"The rig's channels control each other in a circle: {circle}.")
+            elif controller not in done:
+                chain[controller] = iter(by_name[controller].controllers)
     return tuple(done.values())
 
 

@@ -105,7 +105,7 @@ def finger_names(
 
 
 def _is_bare(rig: NamedJoints, wrist: int) -> bool:
-    below = [j for j in range(len(rig.names)) if wrist in rig.above[j]]
+    below = rig.skeleton.descendants(wrist)
     return sum("thumb" not in rig.path(j).lower() for j in below) <= MOST_WITHOUT_FINGERS
 
 

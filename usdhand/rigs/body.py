@@ -183,5 +183,7 @@ def heights_of(skeleton: Skeleton) -> list[int]:
 
 def _line_to_farthest(skeleton: Skeleton, joint: int, reach: Callable[[Chain], float]) -> Chain:
     """Line of joints from ``joint`` down to the leaf of the largest ``reach``."""
-    lines = [_line_to_farthest(skeleton, c, reach) for c in skeleton.children[joint]]
-    return (joint, *max(lines, key=reach)) if lines else (joint,)
+    below = (joint, *skeleton.descendants(joint))
+    leaf = max((j for j in below if not skeleton.children[j]), key=lambda j: reach((j,)))
+    line = (leaf, *skeleton.ancestors(leaf))
+    return line[line.index(joint) :: -1]

@@ -173,6 +173,8 @@ def _read(path: str | Path) -> Table:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{path}: is no valid TOML: {error}") from error
+    except RecursionError as error:
+        raise UsageError(f"{path}: its values are nested too deeply") from error
 
 
 def _explicit(table: Mapping[str, Any], name: str, where: str) -> dict[str, str]:

@@ -181,7 +181,7 @@ def palm_of(skeleton: Skeleton, arms: BareArms, side: Side) -> Array:
     points = joint_points(skeleton)
     body = body_of(skeleton, points, [h.wrist for h in arms.character.hands.values()])
     wrist = points[hand.wrist]
-    below = [j for j in range(len(skeleton)) if hand.wrist in skeleton.ancestors(j)]
+    below = sorted(skeleton.descendants(hand.wrist))
     thumbs = [j for j in below if "thumb" in skeleton.joints[j].lower()]
     top = hand.elbow if hand.elbow is not None else int(skeleton.parents[hand.wrist])
     forearm = wrist - points[top] if top >= 0 else np.zeros(3)

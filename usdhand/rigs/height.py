@@ -25,7 +25,7 @@ def body_height(skeleton: Skeleton, character: CharacterMap) -> float:
     height = length / ARM_TO_HEIGHT
     if character.head is not None and character.hips is not None:
         hips = character.hips
-        body = [j for j in range(len(skeleton)) if j == hips or hips in skeleton.ancestors(j)]
+        body = [hips, *skeleton.descendants(hips)]
         heights = skeleton.bind_positions[:, 1]
         # Not to the highest joint: some rigs have eyes, hair or an end above the head joint.
         standing = float(heights[character.head] - heights[body].min()) / HEAD_TO_HEIGHT

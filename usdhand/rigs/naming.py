@@ -72,11 +72,11 @@ class NamedJoints:
     @cached_property
     def by_key(self) -> dict[str, tuple[int, ...]]:
         """Joints of each key, in the file's order."""
-        found: dict[str, tuple[int, ...]] = {}
+        found: dict[str, list[int]] = {}
         for joint, key in enumerate(self.keys):
             if key:
-                found[key] = (*found.get(key, ()), joint)
-        return found
+                found.setdefault(key, []).append(joint)
+        return {key: tuple(joints) for key, joints in found.items()}
 
     @cached_property
     def above(self) -> tuple[frozenset[int], ...]:

@@ -51,7 +51,7 @@ def search(
     queries : segments with the library's features
     k : how many
     max_ratio : candidates are at most this many times longer or shorter than the query
-    exclude : (queries, any) groups not allowed for each query, filled up with -1
+    exclude : (any,) groups not allowed, or (queries, any) for each query, filled up with -1
     threads : default all cores; the result does not depend on it
     prune : False to try every candidate without lower bounds; the result does not depend on it
 
@@ -75,18 +75,20 @@ def search(
     [[10]]
     """
     excluded = _checked(index, queries, k, max_ratio, exclude)
-    ids = np.full((len(queries), k), -1, np.int64)
-    costs = np.full((len(queries), k), np.inf)
+    asked = np.flatnonzero(~_repeats(queries, excluded))
+    ids = np.full((len(asked), k), -1, np.int64)
+    costs = np.full((len(asked), k), np.inf)
+    answers = np.searchsorted(asked, np.arange(len(queries)), side="right") - 1
     if not len(index) or not len(queries):
-        return Matches(ids, costs)
-    prepared = [prepare_query(index, queries[number], max_ratio) for number in range(len(queries))]
+        return Matches(ids[answers], costs[answers])
+    prepared = [prepare_query(index, queries[number], max_ratio) for number in asked.tolist()]
     most = max(query.last - query.first for query in prepared)
     rows = 1 + len(STAGES) if prune else 1
     size = min(len(prepared), max(_BATCH, int(_ROOM_BYTES / (4 * rows * max(most, 1)))))
     room = np.empty((size, rows, most), np.float32)
     for start in range(0, len(prepared), size):
         batch = prepared[start : start + size]
-        forbidden = excluded[start : start + len(batch)]
+        forbidden = excluded[asked[start : start + len(batch)]]
         if prune:
             _fill_bounds(index, batch, threads, room)
         else:
@@ -96,7 +98,7 @@ def search(
             for number in range(start + first, start + last):
                 query, own = prepared[number], room[number - start]
                 if prune:
-                    found, cost = nearest(index, query, own, excluded[number], k)
+                    found, cost = nearest(index, query, own, excluded[asked[number]], k)
                 else:
                     tried = np.flatnonzero(own[0, : query.last - query.first] < np.inf)
                     found, cost = ranked(index, query, tried, own[0, tried], k, query.error)
@@ -104,7 +106,7 @@ def search(
                 costs[number, : len(cost)] = cost
 
         in_chunks(answer, len(batch), threads)
-    return Matches(ids, costs)
+    return Matches(ids[answers], costs[answers])
 
 
 def merge(first: Matches, second: Matches, k: int) -> Matches:
@@ -134,10 +136,25 @@ def _checked(
         )
     if exclude is None:
         return np.empty((len(queries), 0), np.int32)
-    excluded = np.ascontiguousarray(exclude, np.int32)
+    excluded = np.asarray(exclude, np.int32)
+    if excluded.ndim == 1:
+        return np.broadcast_to(excluded, (len(queries), len(excluded)))
     if excluded.ndim != 2 or len(excluded) != len(queries):
-        raise UsageError(f"exclude has shape {excluded.shape}, not ({len(queries)}, any)")
+        raise UsageError(f"exclude has shape {excluded.shape}, not (any,) or ({len(queries)}, any)")
     return excluded
+
+
+def _repeats(queries: PackedSegments, excluded: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Queries that ask what the one before them asked, as segments of a long hold do.
+
+    To a library that holds the same pose each of them is a search of its own among equal costs.
+    """
+    repeats = [
+        np.array_equal(queries[number], queries[number - 1])
+        and np.array_equal(excluded[number], excluded[number - 1])
+        for number in range(1, len(queries))
+    ]
+    return np.array([False, *repeats][: len(queries)], dtype=bool)
 
 
 def _fill_bounds(
@@ -192,6 +209,7 @@ def _fill_costs(
 
     step = index.code_step.astype(np.float32)
     middle = CODES / 2 * index.code_step
+    excluded = np.sort(excluded, axis=1)
     frames = np.concatenate([query.frames - middle for query in batch])
     squares = np.sum(frames**2, axis=1).astype(np.float32)
     frames = frames.astype(np.float32)

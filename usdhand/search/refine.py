@@ -39,8 +39,7 @@ def nearest(
     here = slice(query.first, query.last)
     begins, lengths = index.begins[here], index.lengths[here]
     bounds = bounds[:, : len(begins)]
-    for group in excluded[excluded >= 0]:
-        bounds[0, index.groups[here] == group] = NEVER
+    bounds[0, np.isin(index.groups[here], excluded[excluded >= 0])] = NEVER
     step = index.code_step.astype(np.float32)
 
     def warped(positions: NDArray[np.int64], frames: int) -> NDArray[np.float32]:

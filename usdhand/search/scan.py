@@ -59,7 +59,7 @@ def scan(
     parts : where each query begins and ends
     ranges : (queries, 2) candidates of a length that may be warped
     slacks, margins, errors : (queries,) see `Query`
-    excluded : (queries, any) groups not allowed
+    excluded : (queries, any) groups not allowed, rising
     codes, step, begins, lengths, groups : see `SearchIndex`
     worst : (queries,) the k-th best cost so far, shared by all threads; whichever of them writes
         last, it is that of k candidates, so that no result depends on it
@@ -221,7 +221,5 @@ def insert(best: Floats, cost: float) -> None:
 @kernel
 def is_excluded(group: int, excluded: Groups) -> bool:
     """True for a group that the query may not be answered from."""
-    found = False
-    for other in excluded:
-        found |= group == other
-    return found
+    at = np.searchsorted(excluded, group)
+    return bool(at < len(excluded) and excluded[at] == group)

@@ -51,9 +51,10 @@ def thumb_stubs(
     found: dict[Side, list[str]] = {}
     for side in sides:
         hand = arms.character.hands.get(side) if arms else None
-        for joint, name in enumerate(skeleton.names):
-            if hand and hand.wrist in skeleton.ancestors(joint) and "thumb" in name.lower():
-                found.setdefault(side, []).append(name)
+        below = sorted(skeleton.descendants(hand.wrist)) if hand else []
+        thumbs = [name for joint in below if "thumb" in (name := skeleton.names[joint]).lower()]
+        if thumbs:
+            found[side] = thumbs
     return found
 
 

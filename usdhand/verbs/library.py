@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import re
 import time
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -308,14 +309,14 @@ def _unique_names(paths: Sequence[Path]) -> list[str]:
     """File names without suffix; where they repeat, with the folder's name before."""
     if len({path.absolute() for path in paths}) < len(paths):
         raise UsageError("A clip is given twice.")
-    stems = [path.stem for path in paths]
-    names: list[str] = []
+    stems = Counter(path.stem for path in paths)
+    numbers: Counter[str] = Counter()
+    names: dict[str, None] = {}
     for path in paths:
-        repeated = stems.count(path.stem) > 1
-        wanted = f"{path.absolute().parent.name}_{path.stem}" if repeated else path.stem
-        name, number = wanted, 1
+        repeated = stems[path.stem] > 1
+        name = wanted = f"{path.absolute().parent.name}_{path.stem}" if repeated else path.stem
         while name in names or (name != path.stem and name in stems):
-            number += 1
-            name = f"{wanted}_{number}"
-        names.append(name)
-    return names
+            numbers[wanted] += 1
+            name = f"{wanted}_{numbers[wanted] + 1}"
+        names[name] = None
+    return list(names)

@@ -63,10 +63,8 @@ def reduce_hands(
         raise UsageError(
             f"There is no fit '{settings.fit}'; there are {' and '.join(get_args(Fit))}."
         )
-    hands = [
-        find_hands(clip, conventions, sides, [c for c in clips if _same_skeleton(c, clip)])
-        for clip in clips
-    ]
+    characters = _characters(clips)
+    hands = [find_hands(clip, conventions, sides, characters[i]) for i, clip in enumerate(clips)]
     sources = [h.encode(clip) for clip, h in zip(clips, hands, strict=True)]
     if rig is None:
         controllers = settings.controllers
@@ -96,11 +94,25 @@ def write_rig(
     return usd_rig.write_rig(reduction, character, Path(output), flatten=flatten, force=force)
 
 
-def _same_skeleton(a: Clip, b: Clip) -> bool:
-    """Whether two clips are of one character, so that they may share anatomical frames."""
-    return a.skeleton.joints == b.skeleton.joints and np.allclose(
-        a.skeleton.bind, b.skeleton.bind, atol=1e-4
-    )
+def _characters(clips: Sequence[Clip]) -> list[list[Clip]]:
+    """For each clip, those of the same character, which may share its anatomical frames.
+
+    That is those with the same joints whose bind pose is that of the first of them.
+    """
+    with_joints: dict[tuple[str, ...], list[list[Clip]]] = {}
+    found: list[list[Clip]] = []
+    for clip in clips:
+        characters = with_joints.setdefault(clip.skeleton.joints, [])
+        own = next((c for c in characters if _same_bind(clip, c[0])), None)
+        if own is None:
+            characters.append(own := [])
+        own.append(clip)
+        found.append(own)
+    return found
+
+
+def _same_bind(a: Clip, b: Clip) -> bool:
+    return a.skeleton is b.skeleton or np.allclose(a.skeleton.bind, b.skeleton.bind, atol=1e-4)
 
 
 def run(request: ReduceRequest, journal: Journal) -> Outcome:

@@ -6,6 +6,7 @@ can move), what is said of it, and packed arrays of what search and assembly nee
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -180,8 +181,8 @@ def relative_path(path: Path, library: Path) -> str:
 
 def _set_time(layer: Sdf.Layer, library: MotionLibrary) -> None:
     """Time codes as most clips count them, so that few are rescaled when they are looked at."""
-    rates = [clip.fps for clip in library.clips]
-    rate = max(sorted(set(rates)), key=rates.count)
+    rates = Counter(clip.fps for clip in library.clips)
+    rate = max(sorted(rates), key=lambda fps: rates[fps])
     layer.timeCodesPerSecond = layer.framesPerSecond = rate
     layer.startTimeCode = 0.0
     layer.endTimeCode = float(np.ceil(rate * max(clip.duration for clip in library.clips)))
@@ -320,11 +321,11 @@ def _floats(values: Any) -> Vt.FloatArray:
 def _prim_names(library: MotionLibrary) -> list[str]:
     """A legal name a clip; different ones for names that differ only in what is not legal."""
     names: dict[str, None] = {}
+    numbers: Counter[str] = Counter()
     for clip in library.clips:
         legal = name = str(Tf.MakeValidIdentifier(clip.name))
-        number = 1
         while name in names:
-            number += 1
-            name = f"{legal}_{number}"
+            numbers[legal] += 1
+            name = f"{legal}_{numbers[legal] + 1}"
         names[name] = None
     return list(names)
