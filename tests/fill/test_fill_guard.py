@@ -17,8 +17,8 @@ from conftest import REPOSITORY, shared_data
 import usdhand
 from usdhand.anatomy import Side
 from usdhand.fill.arm import ArmMotion, arm_motion
+from usdhand.fill.duplicates import same_motion
 from usdhand.fill.library import MotionLibrary, at_arm_rate, library_clip
-from usdhand.fill.same import same_motion
 from usdhand.fill.settings import Segmentation
 from usdhand.motion import Clip
 

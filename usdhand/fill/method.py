@@ -25,12 +25,12 @@ from usdhand.fill.candidates import (
     search_space,
 )
 from usdhand.fill.choose import Graph, choose, graph
+from usdhand.fill.duplicates import same_motion
 from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate, fingers_moving
 from usdhand.fill.limits import channel_limits
 from usdhand.fill.metric import metric_of
 from usdhand.fill.path import SegmentPath
 from usdhand.fill.results import Alternative, Choice, Filled, FilledPart
-from usdhand.fill.same import same_motion
 from usdhand.fill.settings import FillSettings, Segmentation
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array

@@ -21,12 +21,13 @@ from usdhand.motion.rotations import Array
 # after retargeting by the hands' places, rotations on a body of other proportions. Of 24 takes on
 # two rigs, palms turn alike within 0.04 degrees; those of different takes differ by 8 or more. (A
 # root mean square of 1 over the nine numbers of a rotation is 3 degrees.)
-ALIKE: Mapping[Feature, tuple[float, float]] = {
+SAME_WITHIN: Mapping[Feature, tuple[float, float]] = {
     "hips_position": (1.0, 5.0),
     "hips_palm": (1.0, 15.0),
 }
 LONGEST_OFFSET_S = 1.0
 SMALLEST_OVERLAP = 0.7
+SAMPLED_FRAMES = 12  # about so many rule out most offsets
 # An excerpt is looked for all along the longer motion. The shorter it is, the more is like it by
 # chance: of 24 real takes and 67 samples, pieces of 1 s come as near as 1.0 (positions) and 1.6
 # (palms) to some place of another, 1.7 in both; pieces of 2 s as near as 2.2 and 3.5. So a short
@@ -91,7 +92,7 @@ def same_motion(
 
 
 def _rows(arm: ArmMotion) -> Rows:
-    return {name: FeatureCurve(FEATURES[name](arm)) for name in ALIKE}
+    return {name: FeatureCurve(FEATURES[name](arm)) for name in SAME_WITHIN}
 
 
 def _same(pairs: list[tuple[Rows, ArmMotion]]) -> bool:
@@ -101,19 +102,23 @@ def _same(pairs: list[tuple[Rows, ArmMotion]]) -> bool:
     # The arms of a clip have the same length, so that one is the shorter one in all pairs.
     lengths = sorted((len(pairs[0][0]["hips_palm"]), len(pairs[0][1].wrist)))
     both = [(ours, _rows(arm)) for ours, arm in pairs]
-    by_name = {name: [(a[name], b[name]) for a, b in both] for name in ALIKE}
+    by_name = {name: [(a[name], b[name]) for a, b in both] for name in SAME_WITHIN}
     whole = lengths[0] >= SMALLEST_OVERLAP * lengths[1]
-    if whole and any(_alike(by_name[name], *ALIKE[name]) for name in ALIKE):
+    if whole and any(
+        _same_at_one_offset(by_name[name], *SAME_WITHIN[name]) for name in SAME_WITHIN
+    ):
         return True
     if lengths[0] < SHORTEST_EXCERPT_S * ARM_FPS:
         return False
-    alike, moves = zip(*(_inside(by_name[name], *ALIKE[name]) for name in ALIKE), strict=True)
+    within, moves = zip(
+        *(_excerpt_offsets(by_name[name], *SAME_WITHIN[name]) for name in SAME_WITHIN), strict=True
+    )
     if lengths[0] < SHORT_EXCERPT_S * ARM_FPS:
-        return any(moves) and bool(np.all(alike, axis=0).any())
-    return any(m and bool(a.any()) for a, m in zip(alike, moves, strict=True))
+        return any(moves) and bool(np.all(within, axis=0).any())
+    return any(m and bool(a.any()) for a, m in zip(within, moves, strict=True))
 
 
-def _inside(
+def _excerpt_offsets(
     pairs: list[tuple[FeatureCurve, FeatureCurve]], tolerance: float, least: float
 ) -> tuple[NDArray[np.bool_], bool]:
     """At which offsets of the shorter rows in the longer ones all are alike, and if any moves."""
@@ -136,20 +141,43 @@ def _apart(short: FeatureCurve, long: FeatureCurve) -> Array:
     return np.asarray(np.sqrt(np.maximum(total, 0.0) / rows.size))
 
 
-def _alike(pairs: list[tuple[FeatureCurve, FeatureCurve]], tolerance: float, least: float) -> bool:
-    """Whether all pairs of rows (frames, n) are alike at one offset, and some of them moves."""
+def _same_at_one_offset(
+    pairs: list[tuple[FeatureCurve, FeatureCurve]], tolerance: float, least: float
+) -> bool:
+    """Whether all pairs of rows (frames, n) are the same at one offset, and some of them moves."""
     if max(np.ptp(a.rows, axis=0).max() for a, _ in pairs) < least:
         return False
     most = int(LONGEST_OFFSET_S * ARM_FPS)
+    offsets = np.arange(-most, most + 1)
+    for a, b in pairs:
+        offsets = offsets[_within_at_samples(a, b, offsets, tolerance)]
+    return any(
+        all(_apart_at(a, b, offset) < tolerance for a, b in pairs) for offset in offsets.tolist()
+    )
 
-    def apart(offset: int) -> float:
-        distances = []
-        for a, b in pairs:
-            count = min(len(a) - max(-offset, 0), len(b) - max(offset, 0))
-            if count < SMALLEST_OVERLAP * min(len(a), len(b)):
-                return np.inf
-            first, second = a.rows[max(-offset, 0) :][:count], b.rows[max(offset, 0) :][:count]
-            distances.append(float(np.sqrt(np.mean((first - second) ** 2))))
-        return max(distances)
 
-    return any(apart(offset) < tolerance for offset in range(-most, most + 1))
+def _overlap(a: FeatureCurve, b: FeatureCurve, offset: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Frames that A and B have in common where B is ``offset`` frames late."""
+    return np.asarray(np.minimum(len(a) - np.maximum(-offset, 0), len(b) - np.maximum(offset, 0)))
+
+
+def _within_at_samples(
+    a: FeatureCurve, b: FeatureCurve, offsets: NDArray[np.intp], tolerance: float
+) -> NDArray[np.bool_]:
+    """(offsets,) false where a few frames alone are further apart than all may be."""
+    count = _overlap(a, b, offsets)
+    frames = np.arange(0, len(a), max(1, len(a) // SAMPLED_FRAMES))
+    there = frames + offsets[:, None]
+    inside = (there >= 0) & (there < len(b))
+    away = a.rows[frames] - b.rows[np.clip(there, 0, len(b) - 1)]
+    squares = (np.square(away).sum(axis=2) * inside).sum(axis=1)
+    limit = tolerance**2 * count * a.rows.shape[1]
+    enough = count >= SMALLEST_OVERLAP * min(len(a), len(b))
+    return np.asarray(enough & (squares <= limit * (1.0 + 1e-9)))
+
+
+def _apart_at(a: FeatureCurve, b: FeatureCurve, offset: int) -> float:
+    """Root mean square between the rows that A and B have in common."""
+    count = int(_overlap(a, b, np.array(offset)))
+    first, second = a.rows[max(-offset, 0) :][:count], b.rows[max(offset, 0) :][:count]
+    return float(np.sqrt(np.mean((first - second) ** 2)))
