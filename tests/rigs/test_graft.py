@@ -23,7 +23,7 @@ from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip, Skeleton, forward_kinematics, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.rigs import map_character
-from usdhand.rigs.bare import bare_arms
+from usdhand.rigs.fingerless import fingerless_arms
 from usdhand.rigs.graft import Grafted, add_finger_joints, hand_shape
 
 SAMPLES = REPOSITORY / "samples"
@@ -116,7 +116,7 @@ def test_every_naming(name: str, pose: str, ada: Clip) -> None:
     hands = map_character(whole)
     fingers = {j for (side, role), j in index.items() if side and role[:5] in _DIGITS}
     body = without(still(whole), fingers)
-    assert bare_arms(body.skeleton) is not None
+    assert fingerless_arms(body.skeleton) is not None
     made = grafted(body, ada)
     found = usdhand.find_hands(made.clip)
     for side in SIDES:
@@ -183,7 +183,7 @@ def test_a_hand_joint_gives_the_direction(ada: Clip) -> None:
 def test_arms_that_hang_have_their_thumbs_in_front(ada: Clip) -> None:
     """As motion from a zero pose has it."""
     s = bare(ada).skeleton
-    arms = bare_arms(s)
+    arms = fingerless_arms(s)
     assert arms is not None
     bind = s.bind.copy()
     for side, sign in (("left", -1.0), ("right", 1.0)):

@@ -16,9 +16,9 @@ from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import affine, rigid, unit
 from usdhand.rigs import Conventions, load_conventions
-from usdhand.rigs.bare import BareArms, bare_arms, finger_names
 from usdhand.rigs.body import body_of, joint_points
 from usdhand.rigs.conventions import METACARPALS, TIPS
+from usdhand.rigs.fingerless import FingerlessArms, finger_names, fingerless_arms
 from usdhand.rigs.height import body_height
 
 # A joint below the wrist tells the hand's direction if it is this far away, in forearms, and not
@@ -85,7 +85,7 @@ def add_finger_joints(
         if no arm without fingers is found on these sides.
     """
     conventions = conventions or load_conventions()
-    arms = bare_arms(clip.skeleton, conventions)
+    arms = fingerless_arms(clip.skeleton, conventions)
     wanted = [side for side in sides if arms and side in arms.character.hands]
     if arms is None or not wanted:
         raise HandNotFoundError(
@@ -137,7 +137,9 @@ def hand_shape(skeleton: Skeleton, hands: Hands, side: Side) -> HandShape:
     )
 
 
-def _with_hand(clip: Clip, arms: BareArms, shape: HandShape, names: Mapping[str, str]) -> Clip:
+def _with_hand(
+    clip: Clip, arms: FingerlessArms, shape: HandShape, names: Mapping[str, str]
+) -> Clip:
     """The clip with the joints of ``names`` behind its own, unmoved."""
     skeleton, hand = clip.skeleton, arms.character.hands[shape.side]
     palm = palm_of(skeleton, arms, shape.side)
@@ -172,7 +174,7 @@ def _with_hand(clip: Clip, arms: BareArms, shape: HandShape, names: Mapping[str,
     )
 
 
-def palm_of(skeleton: Skeleton, arms: BareArms, side: Side) -> Array:
+def palm_of(skeleton: Skeleton, arms: FingerlessArms, side: Side) -> Array:
     """Frame (3, 3) of a palm without fingers at the bind pose: abduction, flexion, long axis.
 
     The long axis goes to a joint below the wrist if there is one, else on along the forearm.
@@ -215,7 +217,7 @@ def palm_of(skeleton: Skeleton, arms: BareArms, side: Side) -> Array:
     return np.stack([np.cross(flexion, forward), flexion, forward], axis=1)
 
 
-def _to_the_left(points: Array, arms: BareArms, side: Side, forward: Array) -> Array:
+def _to_the_left(points: Array, arms: FingerlessArms, side: Side, forward: Array) -> Array:
     """Direction (3,) to the character's left, from both arms or from one and the body."""
     tops = {
         s: points[h.shoulder if h.shoulder is not None else h.wrist]
@@ -228,7 +230,7 @@ def _to_the_left(points: Array, arms: BareArms, side: Side, forward: Array) -> A
     return unit(out if side == "left" else -out)
 
 
-def _size(skeleton: Skeleton, arms: BareArms, shape: HandShape) -> float:
+def _size(skeleton: Skeleton, arms: FingerlessArms, shape: HandShape) -> float:
     """How many times larger the body is than the character of the hand."""
     own = _forearm(skeleton, arms.character.hands[shape.side])
     if own and shape.forearm:

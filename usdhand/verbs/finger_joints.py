@@ -17,7 +17,7 @@ from usdhand.problems import listed
 from usdhand.requests.fill import FillRequest
 from usdhand.requests.shared import sides as sides_of
 from usdhand.rigs import Conventions
-from usdhand.rigs.bare import bare_arms
+from usdhand.rigs.fingerless import fingerless_arms
 from usdhand.rigs.graft import Grafted, add_finger_joints
 from usdhand.rigs.height import body_height
 from usdhand.verbs.clips import find_hands
@@ -39,7 +39,7 @@ def lacks_fingers(
     clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
 ) -> list[Side]:
     """Sides on which a body has an arm and no fingers."""
-    arms = bare_arms(clip.skeleton, conventions)
+    arms = fingerless_arms(clip.skeleton, conventions)
     return [side for side in sides if arms is not None and side in arms.character.hands]
 
 
@@ -47,7 +47,7 @@ def thumb_stubs(
     clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
 ) -> dict[Side, list[str]]:
     """Names of thumb joints that a body without fingers has; what is added stands beside them."""
-    arms, skeleton = bare_arms(clip.skeleton, conventions), clip.skeleton
+    arms, skeleton = fingerless_arms(clip.skeleton, conventions), clip.skeleton
     found: dict[Side, list[str]] = {}
     for side in sides:
         hand = arms.character.hands.get(side) if arms else None
@@ -110,7 +110,7 @@ def _by_fit(
     clip: Clip, library: MotionLibrary, conventions: Conventions | None
 ) -> list[LibraryClip]:
     """A clip of each character, the most fitting one first."""
-    arms = bare_arms(clip.skeleton, conventions)
+    arms = fingerless_arms(clip.skeleton, conventions)
     height = body_height(clip.skeleton, arms.character) if arms else 1.0
 
     def fit(entry: LibraryClip) -> tuple[int, float, str]:

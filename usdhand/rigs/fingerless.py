@@ -12,7 +12,7 @@ from usdhand.motion.skeleton import Skeleton, leaf_name
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.rigs.body import arm_joints, body_of
 from usdhand.rigs.conventions import Convention, name_key
-from usdhand.rigs.naming import NamedJoints
+from usdhand.rigs.joint_names import NamedJoints
 
 # A wrist with more joints below it, thumb aside, has fingers, whatever they are called. A mitten
 # has up to three: a hand, all fingers in one, an end.
@@ -20,7 +20,7 @@ MOST_WITHOUT_FINGERS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class BareArms:
+class FingerlessArms:
     """Arms of a skeleton that has no fingers there.
 
     Attributes
@@ -43,7 +43,9 @@ class _ArmMatch:
     rank: tuple[int, int, int]
 
 
-def bare_arms(skeleton: Skeleton, conventions: Conventions | None = None) -> BareArms | None:
+def fingerless_arms(
+    skeleton: Skeleton, conventions: Conventions | None = None
+) -> FingerlessArms | None:
     """Arms without fingers, by the names of their joints; None if there are none.
 
     Wrists that a map file names win over known conventions.
@@ -58,7 +60,7 @@ def bare_arms(skeleton: Skeleton, conventions: Conventions | None = None) -> Bar
         own |= {
             r: j for r in ARM_JOINTS if r in named and (j := skeleton.find(named[r])) is not None
         }
-        if "wrist" in own and _is_bare(rig, own["wrist"]):
+        if "wrist" in own and _is_fingerless(rig, own["wrist"]):
             arms[side] = own
     if not arms:
         return None
@@ -73,11 +75,15 @@ def bare_arms(skeleton: Skeleton, conventions: Conventions | None = None) -> Bar
     named_by_file = any("wrist" in conventions.explicit.get(side, {}) for side in arms)
     convention = None if named_by_file or found is None else found.convention
     name = convention.name if convention else "map file"
-    return BareArms(CharacterMap(hands, name, **body), convention)
+    return FingerlessArms(CharacterMap(hands, name, **body), convention)
 
 
 def finger_names(
-    skeleton: Skeleton, arms: BareArms, side: Side, roles: Sequence[str], conventions: Conventions
+    skeleton: Skeleton,
+    arms: FingerlessArms,
+    side: Side,
+    roles: Sequence[str],
+    conventions: Conventions,
 ) -> dict[str, str]:
     """Leaf names for the joints of a hand, in the skeleton's own manner of naming.
 
@@ -104,7 +110,7 @@ def finger_names(
     raise AssertionError("no convention has free names")  # they are some thirty, all different
 
 
-def _is_bare(rig: NamedJoints, wrist: int) -> bool:
+def _is_fingerless(rig: NamedJoints, wrist: int) -> bool:
     below = rig.skeleton.descendants(wrist)
     return sum("thumb" not in rig.path(j).lower() for j in below) <= MOST_WITHOUT_FINGERS
 

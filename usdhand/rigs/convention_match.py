@@ -1,0 +1,126 @@
+"""Naming conventions laid over the names of a skeleton's joints, and how well each fits."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from usdhand.anatomy.hand import FINGERS, HAND_JOINTS, Side
+from usdhand.rigs.conventions import Convention
+from usdhand.rigs.joint_names import Candidates, NamedJoints
+
+
+@dataclass(frozen=True)
+class ConventionMatch:
+    """One convention laid over a rig, with the prefix and suffix that its names have there."""
+
+    convention: Convention
+    prefix: str
+    suffix: str
+    hands: Mapping[Side | None, Candidates]
+    body: Candidates
+    rank: tuple[int, ...]
+
+
+def exact_roles(rig: NamedJoints, names: Mapping[str, Sequence[str]]) -> Candidates:
+    """Joints with one of the names of each role, and nothing around it."""
+    found = {
+        role: tuple(j for k in keys for j in rig.by_key.get(k, ())) for role, keys in names.items()
+    }
+    return {role: joints for role, joints in found.items() if joints}
+
+
+def convention_matches(rig: NamedJoints, convention: Convention) -> Iterator[ConventionMatch]:
+    """Ways to lay a convention over a rig that give a hand, by what stands around its names."""
+    for prefix, suffix in _affixes(rig, convention):
+
+        def joints(names: Sequence[str], pre: str = prefix, post: str = suffix) -> tuple[int, ...]:
+            return next((f for n in names if (f := rig.by_key.get(pre + n + post))), ())
+
+        hands: dict[Side | None, Candidates] = {}
+        for side, roles in convention.hand_keys.items():
+            found = {role: js for role, names in roles.items() if (js := joints(names))}
+            if is_hand(found):
+                hands[side] = found
+        if not hands:
+            continue
+        body = {role: js for role, names in convention.body_keys.items() if (js := joints(names))}
+        # The arms may hang from any spine joint: keep them all, the hierarchy decides.
+        chests = [joints([n]) for n in convention.body_keys.get("chest", ())]
+        body["chest"] = tuple(j for js in chests for j in js)
+        rank = _rank(rig, convention, prefix, suffix, hands, body)
+        yield ConventionMatch(convention, prefix, suffix, hands, body, rank)
+
+
+def is_hand(roles: Mapping[str, object]) -> bool:
+    """Two fingers with two joints each are the least that can be called a hand."""
+    return sum(f + "MCP" in roles and f + "PIP" in roles for f in FINGERS) >= 2
+
+
+def _affixes(rig: NamedJoints, convention: Convention) -> list[tuple[str, str]]:
+    """Most frequent (prefix, suffix) around the names of finger joints; the plain one first."""
+    text = "\n".join(rig.by_key)
+    found: Counter[tuple[str, str]] = Counter()
+    for roles in convention.hand_keys.values():
+        for anchor in (n for f in FINGERS for j in ("MCP", "PIP") for n in roles.get(f + j, ())):
+            if anchor not in text:
+                continue
+            for key in rig.by_key:
+                if (start := key.rfind(anchor)) >= 0:
+                    found[key[:start], key[start + len(anchor) :]] += 1
+    return sorted(found, key=lambda a: (-found[a], len(a[0]) + len(a[1]), a))[:8]
+
+
+def _rank(
+    rig: NamedJoints,
+    convention: Convention,
+    prefix: str,
+    suffix: str,
+    hands: Mapping[Side | None, Candidates],
+    body: Candidates,
+) -> tuple[int, ...]:
+    """How well a match fits; the larger the better, the first difference decides."""
+    required = sum(r in roles for roles in hands.values() for r in ("wrist", *HAND_JOINTS))
+    matched = sum(map(len, hands.values())) + sum(map(bool, body.values()))
+    in_line = sum(
+        any(inner in rig.above[outer] for inner in roles[a] for outer in roles[b])
+        for roles in hands.values()
+        for f in FINGERS
+        for a, b in ((f + "MCP", f + "PIP"), (f + "PIP", f + "DIP"))
+        if a in roles and b in roles
+    )
+    wanted = convention.prefix_keys[::-1]
+    own_prefix = 1 + max((i for i, p in enumerate(wanted) if prefix.startswith(p)), default=-1)
+    spelled = sum(
+        any(n in rig.names[j] for n in convention.hands[side].get(role, ()) for j in joints)
+        for side, roles in hands.items()
+        for role, joints in roles.items()
+    )
+    return (
+        len(hands),
+        convention.own,
+        required,
+        matched,
+        in_line,
+        own_prefix,
+        -len(prefix) - len(suffix),
+        spelled,
+        sum(_thumb_starts_well(rig, roles) for roles in hands.values()),
+    )
+
+
+def _thumb_starts_well(rig: NamedJoints, roles: Candidates) -> bool:
+    """Whether the first joint of a thumb with joints missing lies where its name says.
+
+    VRM 0 calls the CMC what VRM 1 calls the MCP; of real hands the CMC lies at 0.25 to 0.48 of the
+    way from the wrist to the knuckles, the MCP beyond 0.7.
+    """
+    line = [r for r in ("ThumbCMC", "ThumbMCP", "ThumbIP") if r in roles]
+    if len(line) == 3 or not {"wrist", *line[:1]} <= set(roles) or line[:1] == ["ThumbIP"]:
+        return False
+    joints = [roles[r][0] for r in (*line[:1], *(f + "MCP" for f in FINGERS)) if r in roles]
+    thumb, *knuckles = np.linalg.norm(rig.points[joints] - rig.points[roles["wrist"][0]], axis=1)
+    return bool((thumb < 0.6 * np.mean(knuckles)) == (line[0] == "ThumbCMC")) if line else False
