@@ -17,9 +17,9 @@ from usdhand.anatomy.angles import (
     from_swing_twist,
     inverse,
     product,
+    rotate,
     same_signs,
     swing_twist_angles,
-    turned,
 )
 from usdhand.anatomy.channels import (
     Channels,
@@ -183,7 +183,7 @@ def test_products_are_those_of_the_motion_package(seed: int) -> None:
     v = random.normal(size=(5, 3))
     assert_allclose(product(a.T, b.T).T, rot.multiply(a, b), atol=1e-12)
     assert_allclose(inverse(a.T).T, rot.conjugate(a), atol=1e-12)
-    assert_allclose(turned(a.T, v.T).T, rot.rotate(a, v), atol=1e-12)
+    assert_allclose(rotate(a.T, v.T).T, rot.rotate(a, v), atol=1e-12)
 
 
 # --- a whole hand --------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from conftest import REPOSITORY, shared_data
 from numpy.testing import assert_allclose
 
 from usdhand import find_hands, read_clip
-from usdhand.anatomy.channels import Channels, Hands, following
+from usdhand.anatomy.channels import Channels, Hands, carry_followers
 from usdhand.anatomy.frames import hand_frames
 from usdhand.anatomy.hand import DIGITS, SIDES, CharacterMap, HandMap
 from usdhand.errors import HandNotFoundError, UsageError
@@ -171,7 +171,7 @@ def test_a_turned_wrist_takes_a_flat_hand_along(role: str | None) -> None:
         q = clip.rotations.copy()
         wrist = INDEX["left", "wrist"]
         q[:, wrist] = rot.multiply(q[:, wrist], turn)
-        return following(clip, clip.with_rotations(q), hands_of(clip).frames["left"])
+        return carry_followers(clip, clip.with_rotations(q), hands_of(clip).frames["left"])
 
     assert_same_world(turned(bones), turned(flat))
 

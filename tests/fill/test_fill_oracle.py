@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from oracles import fill_2012 as oracle
 
-from usdhand.fill.assemble import Piece, join, limited
+from usdhand.fill.assemble import Piece, join, within_limits
 from usdhand.fill.path import alternative_paths, best_path, path_cost, transition_cost
 from usdhand.fill.segment import segments
 from usdhand.fill.settings import Segmentation
@@ -154,7 +154,7 @@ def test_limits_hold_without_corners(seed: int, frames: int, fps: float) -> None
     curves = 40 * np.sin(random.uniform(1, 8, 4) * time + random.uniform(0, 6, 4))
     low, high = np.full(4, -30.0), np.full(4, 35.0)
     low[3], high[3] = -100.0, 100.0
-    found = limited(curves, low, high, fps)
+    found = within_limits(curves, low, high, fps)
     assert (found >= low).all()
     assert (found <= high).all()
     assert np.array_equal(found[:, 3], curves[:, 3])
@@ -173,7 +173,7 @@ def test_a_limit_bends_no_faster_than_hands_do() -> None:
     def sharpest(values: Array) -> float:
         return float(np.abs(np.diff(values, n=2, axis=0)).max() * 60**2)
 
-    eased = limited(curves, low, high, 60.0)
+    eased = within_limits(curves, low, high, 60.0)
     assert sharpest(np.clip(curves, low, high)) > 5000
     assert sharpest(eased) < 2000
     assert eased.max() > 25  # and is not held far below the limit

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from usdhand.motion import Clip, Origin, Skeleton, resample
 from usdhand.motion.editing import counted_in_frames, recounted, starting_at, trim
-from usdhand.motion.resample import in_time_of
+from usdhand.motion.resample import resample_like
 from usdhand.motion.timing import (
     GRID_FPS,
     MOST_FRAMES,
@@ -99,7 +99,7 @@ def test_whole_time_codes_stay_whole(first: float, fps: float, frames: int) -> N
         counted_in_frames(clip),
         counted_in_frames(recounted(clip, 2.0 * fps)),
         recounted(counted_in_frames(clip), fps),
-        in_time_of(clip_of(3, 30.0, 0.0, fps), clip),
+        resample_like(clip_of(3, 30.0, 0.0, fps), clip),
         resample(clip, fps),
         starting_at(clip_of(frames, fps, 5.0), first),
         trim(clip_of(frames + 7, fps, first - 7), first, None),

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 
 from usdhand.errors import QualityError, UsageError
 from usdhand.motion.rotations import Array
-from usdhand.reduce.fit import Statistics, fit_relations
-from usdhand.reduce.search import channel_errors, thresholds_for_count, thresholds_for_error
+from usdhand.reduce.fit import Statistics, controllers_at, fit_relations
+from usdhand.reduce.search import _errors, thresholds_for_count, thresholds_for_error
 from usdhand.reduce.settings import Fit, Thresholds
 
 FITS: tuple[Fit, ...] = ("paper", "least-squares")
@@ -91,9 +91,9 @@ def test_errors_without_curves_are_those_of_the_relations(fit: Fit) -> None:
     for seed in range(20):
         statistics = Statistics.of(curves(seed, 12))
         limits = Thresholds(4.0, 0.7)
-        assert_allclose(
-            channel_errors(statistics, limits, fit), result(statistics, limits, fit)[1], atol=1e-9
-        )
+        roots = controllers_at(statistics, limits.range, np.array([limits.rmsd]))
+        errors = _errors(statistics, limits.range, roots, fit)[0]
+        assert_allclose(errors, result(statistics, limits, fit)[1], atol=1e-9)
 
 
 def test_duplicates_leave_fewer_where_the_count_cannot_be_had() -> None:

@@ -21,9 +21,9 @@ from usdhand.fill.results import Filled
 from usdhand.fill.settings import FillSettings
 from usdhand.motion import Clip
 from usdhand.reduce.errors import pca_rms
-from usdhand.reduce.fit import Statistics
+from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.method import Reduction
-from usdhand.reduce.search import channel_errors, errors_by_count, thresholds_for_count
+from usdhand.reduce.search import errors_by_count, thresholds_for_count
 from usdhand.reduce.settings import ReduceSettings
 from usdhand.report.plots import evaluating, filling, reducing, splicing, style
 from usdhand.report.splice import splice_result
@@ -190,7 +190,9 @@ def test_error_against_number_of_channels(reduction: Reduction) -> None:
     for fit, label in (("paper", "the paper's fit"), ("least-squares", "least squares")):
         curve = dict(drawn[f"one controller, {label}"])
         for count in (0, 7, 20, 41):
-            best = channel_errors(statistics, thresholds_for_count(statistics, count, fit), fit)
+            limits = thresholds_for_count(statistics, count, fit)
+            fitted = fit_relations(reduction.rig.names, statistics, limits, fit)
+            best = np.array([relation.rms_error for relation in fitted])
             assert curve[count] == pytest.approx(np.sqrt(np.mean(best**2)), rel=1e-9)
     bound = dict(drawn["PCA: the least of any linear model"])
     assert bound[20] == pytest.approx(pca_rms(own, 20))

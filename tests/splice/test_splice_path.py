@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracles.splice_2006 import algorithm_1, best_turn, distance_of_signs
 from scipy.spatial.transform import Rotation
 
-from usdhand.dtw.phases import NEVER, phase_path, sign_costs, signs_along, turn_angles
+from usdhand.dtw.phases import UNREACHED, phase_path, sign_costs, signs_along, turn_angles
 from usdhand.errors import UsageError
 from usdhand.splice.band import anchors_of, band_along, checked_pins, pinned_band
 from usdhand.splice.markers import Markers
@@ -17,7 +17,7 @@ from usdhand.splice.method import align
 from usdhand.splice.phases import smoothed
 from usdhand.splice.refine import refined
 from usdhand.splice.settings import Pin, SpliceSettings
-from usdhand.splice.warps import EXACT, stiff, through_pins
+from usdhand.splice.warps import EXACT, through_pins, whittaker_smoothed
 
 NO_TURN = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
 
@@ -135,24 +135,24 @@ def test_a_stiff_curve_is_the_least_squares_one(n: int) -> None:
     values, weights = random.normal(size=n), random.uniform(0.1, 1.0, n)
     bend = np.diff(np.eye(n), n=2, axis=0)
     wanted = np.linalg.solve(np.diag(weights) + 7.0 * bend.T @ bend, weights * values)
-    assert np.allclose(stiff(values, weights, 7.0), wanted)
+    assert np.allclose(whittaker_smoothed(values, weights, 7.0), wanted)
     weights[1] = EXACT
-    assert abs(stiff(values, weights, 7.0)[1] - values[1]) < 1e-6
+    assert abs(whittaker_smoothed(values, weights, 7.0)[1] - values[1]) < 1e-6
 
 
 def test_a_stiff_curve_bends_freely_at_a_pin_where_the_speed_jumps_and_nowhere_else() -> None:
     rows = np.arange(101.0)
     values, weights = np.maximum(rows - 50.0, 0.0) * 3.0, np.full(101, 0.02)
     weights[50] = EXACT
-    assert np.abs(stiff(values, weights, 500.0) - values).max() < 1e-6
+    assert np.abs(whittaker_smoothed(values, weights, 500.0) - values).max() < 1e-6
     values[51:] += 40.0  # a jump after the pin is nothing to what is before it
-    assert np.abs(stiff(values, weights, 500.0) - values)[:50].max() < 1e-6
+    assert np.abs(whittaker_smoothed(values, weights, 500.0) - values)[:50].max() < 1e-6
     values = rows + np.random.default_rng(5).normal(size=101)
     values[50] = 50.0
     bend = np.diff(np.eye(101), n=2, axis=0)
     wanted = np.linalg.solve(np.diag(weights) + 500.0 * bend.T @ bend, weights * values)
-    assert np.abs(stiff(values, weights, 500.0) - wanted).max() < 1e-5
-    moved = stiff(values - rows, weights, 500.0, rows)
+    assert np.abs(whittaker_smoothed(values, weights, 500.0) - wanted).max() < 1e-5
+    moved = whittaker_smoothed(values - rows, weights, 500.0, rows)
     assert np.abs(moved + rows - wanted).max() < 1e-5
 
 
@@ -272,7 +272,7 @@ def test_all_passes_get_through_whatever_the_pins(
     pins = checked_pins(one_a_frame(pins), "left", (rows - 1) / 60.0, (columns - 1) / 60.0)
     times = np.arange(rows) / 60.0
     second, first, cost = align(body, hand, SpliceSettings(band=(width, 0.01)), pins, times)
-    assert cost < NEVER
+    assert cost < UNREACHED
     for warp in (first, second):
         assert (np.diff(warp) >= 0).all()
         assert all(abs(np.interp(p.body, times, warp) - p.hand) < p.tolerance + 1e-6 for p in pins)

@@ -112,7 +112,7 @@ def inverse(q: Array) -> Array:
     return np.stack([-q[0], -q[1], -q[2], q[3]])
 
 
-def turned(q: Array, v: Array) -> Array:
+def rotate(q: Array, v: Array) -> Array:
     """Vectors (3, frames) turned by unit quaternions (4, frames)."""
     x, y, z, w = q
     vx, vy, vz = v

@@ -35,6 +35,8 @@ from usdhand.motion.rotations import Array
 # The letters that abduction, flexion and twist have in a channel's name.
 FINGER_AXES = ("x", "y", "z")
 THUMB_AXES = ("x", "z", "y")
+# Fingers none of whose channels changes by more are still; gloves and solvers leave some noise.
+STILL_FINGERS_DEG = 2.0
 
 
 @displayed(
@@ -87,6 +89,11 @@ def model_channels(side: Side, joints: Sequence[str]) -> tuple[str, ...]:
     return tuple(keep)
 
 
+def fingers_move(curves: Array) -> bool:
+    """Whether finger channels (frames, channels) in degrees have motion of their own."""
+    return bool(np.ptp(curves, axis=0).max(initial=0.0) > STILL_FINGERS_DEG)
+
+
 def is_flexion(channel: str) -> bool:
     """Whether a channel is the flexion of its joint."""
     return channel[-1] == ("z" if channel[2:].startswith("Thumb") else "y")
@@ -102,14 +109,14 @@ def encode(clip: Clip, frames: HandFrames) -> Channels:
     """
     rows = np.empty((3 * len(frames.names), len(clip)))
     to_frames = _frame_matrices(frames)
-    for i, (name, turn) in enumerate(zip(frames.names, turns(clip, frames), strict=True)):
+    for i, (name, turn) in enumerate(zip(frames.names, joint_rotations(clip, frames), strict=True)):
         take_apart = swing_twist_angles if _is_ball(name) else euler_angles
         angles = take_apart(to_frames[i] @ turn)
         rows[3 * i : 3 * i + 3] = (angles * _mirror(frames))[_letters(name)]
     return Channels(all_channels(frames.side, frames.names), rows.T)
 
 
-def turns(clip: Clip, frames: HandFrames) -> list[Array]:
+def joint_rotations(clip: Clip, frames: HandFrames) -> list[Array]:
     """Rotation (4, frames) of every joint of a hand from the joint that it is measured from."""
     motion = LocalMotion(clip)
     pairs = zip(frames.joints, frames.references, strict=True)
@@ -133,7 +140,7 @@ def local_motion(channels: Channels, clip: Clip, frames: HandFrames) -> LocalMot
     return _posed(clip, clip, frames, wanted)
 
 
-def following(before: Clip, after: Clip, frames: HandFrames) -> Clip:
+def carry_followers(before: Clip, after: Clip, frames: HandFrames) -> Clip:
     """``after``, whose wrist moves differently, with what does not hang off it carried along.
 
     Only the joints of a flat hand follow (see `HandFrames.followers`).
@@ -156,8 +163,8 @@ def _posed(
         if parent != reference:
             turn = product(new.between(parent, reference), turn)
         if joint in frames.links.followers:
-            offset = old.carried(old.translation(joint), parent, reference)
-            new.translations[joint] = new.carried(offset, reference, parent)
+            offset = old.change_axes(old.translation(joint), parent, reference)
+            new.translations[joint] = new.change_axes(offset, reference, parent)
         new.rotations[joint] = turn
     return new
 

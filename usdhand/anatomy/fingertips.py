@@ -28,7 +28,7 @@ def fingertips(
     result = np.empty((3, len(frames.digits), len(clip)))
     for i, digit in enumerate(frames.digits):
         tip = np.broadcast_to(frames.tips[i][:, None], (3, len(clip)))
-        result[:, i] = motion.carried(tip, frames.last_joint(digit), hand.wrist)
+        result[:, i] = motion.change_axes(tip, frames.last_joint(digit), hand.wrist)
     for j in (hand.wrist, *clip.skeleton.ancestors(hand.wrist)):
         if j in motion.scaled:  # the size of the hand in the world
             result *= clip.scales[:, j].mean(axis=1)

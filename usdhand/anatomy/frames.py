@@ -118,9 +118,13 @@ def hand_frames(skeleton: Skeleton, hand: HandMap, *clips: Clip) -> HandFrames:
             bone = _direction(skeleton, j, end - start)
             first, reference = name == chain[0], reference_of[j]
             if digit == "Thumb" and not first and palm.is_normal(bone):
-                above, note = _flexing_as_it_moves(skeleton, (j, reference), bone, above, clips)
+                above, note = _frame_from_motion(skeleton, (j, reference), bone, above, clips)
                 notes.append(f"{hand.side} {name}: {note}")
-            own = _swung(above, bone) if digit == "Thumb" and first else _bent(above, bone)
+            own = (
+                _swung_frame(above, bone)
+                if digit == "Thumb" and first
+                else _bent_frame(above, bone)
+            )
             reference_frames.append(skeleton.bind_rotations[reference].T @ above)
             joint_frames.append(skeleton.bind_rotations[j].T @ own)
             above = own
@@ -193,7 +197,7 @@ def _frame(bone: Array, flexion_axis: Array) -> Array:
     return np.stack([np.cross(y, z), y, z], axis=1)
 
 
-def _bent(above: Array, bone: Array) -> Array:
+def _bent_frame(above: Array, bone: Array) -> Array:
     """Frame (3, 3) of a bone that is bent from the one before it, without twist.
 
     Flexion and abduction alone lead from ``above`` to the bone, so that how far the digits were
@@ -201,20 +205,20 @@ def _bent(above: Array, bone: Array) -> Array:
     """
     x, y, z = above.T @ unit(bone)
     flexion, abduction = np.arctan2(x, z), np.arcsin(np.clip(-y, -1.0, 1.0))
-    turn = rot.multiply(_about(1, flexion), _about(0, abduction))
+    turn = rot.multiply(_rotation_about(1, flexion), _rotation_about(0, abduction))
     return np.asarray(above @ rot.to_matrix(turn))
 
 
-def _swung(above: Array, bone: Array) -> Array:
+def _swung_frame(above: Array, bone: Array) -> Array:
     """Frame (3, 3) of a bone that the shortest rotation brings there from ``above``."""
     return np.asarray(rot.to_matrix(rot.between_vectors(above[:, 2], unit(bone))) @ above)
 
 
-def _about(axis: int, radians: float) -> Array:
+def _rotation_about(axis: int, radians: float) -> Array:
     return rot.from_axis_angle(np.eye(3)[axis], radians)
 
 
-def _flexing_as_it_moves(
+def _frame_from_motion(
     skeleton: Skeleton, link: Link, bone: Array, above: Array, clips: Sequence[Clip]
 ) -> tuple[Array, str]:
     """Frame of the bone before a joint, turned to the principal axis of the joint's motion.
@@ -235,7 +239,7 @@ def _flexing_as_it_moves(
     axis = np.linalg.eigh(turns.T @ turns)[1][:, -1]
     if np.degrees(np.abs(turns @ axis).max()) < LEAST_MOTION_DEG:
         return kept
-    axis = axis * np.sign(axis @ _bent(above, bone)[:, 1] or 1.0)
+    axis = axis * np.sign(axis @ _bent_frame(above, bone)[:, 1] or 1.0)
     return _frame(above[:, 2], axis), f"{unknown} its motion"
 
 

@@ -53,26 +53,32 @@ def hand_links(skeleton: Skeleton, hand: HandMap) -> HandLinks:
     ends: list[Link] = []
     followers: set[int] = set()
 
-    def apart(joint: int, above: int) -> bool:
+    def detached(joint: int, above: int) -> bool:
         return above not in skeleton.ancestors(joint)
 
     for digit in DIGITS:
         chain = [hand.joints[n] for n in _names(digit) if n in hand.joints]
         if not chain:
             continue
-        first, flat = chain[0], any(apart(j, above) for above, j in pairwise(chain))
+        first, flat = chain[0], any(detached(j, above) for above, j in pairwise(chain))
         base = hand.wrist
         if flat and digit in hand.metacarpals:
             base = hand.metacarpals[digit]
-            if apart(base, hand.wrist):
+            if detached(base, hand.wrist):
                 palm.append((base, hand.wrist))
-        joints.append((first, base if apart(first, base) else int(skeleton.parents[first])))
+        joints.append((first, base if detached(first, base) else int(skeleton.parents[first])))
         for above, j in pairwise(chain):
-            joints.append((j, above if apart(j, above) else int(skeleton.parents[j])))
+            joints.append((j, above if detached(j, above) else int(skeleton.parents[j])))
         if flat:
-            followers |= {j for j, above in pairwise([*reversed(chain), base]) if apart(j, above)}
+            followers |= {
+                j for j, above in pairwise([*reversed(chain), base]) if detached(j, above)
+            }
         tip = hand.tips.get(digit)
-        if tip is not None and apart(tip, chain[-1]) and not _carries(skeleton, hand, tip):
+        if (
+            tip is not None
+            and detached(tip, chain[-1])
+            and not _carries_others(skeleton, hand, tip)
+        ):
             ends.append((tip, chain[-1]))
     links = (*palm, *joints, *ends)
     followers |= {j for j, _ in (*palm, *ends)}
@@ -85,7 +91,7 @@ def _names(digit: str) -> list[str]:
     return [digit + j for j in digit_joints(digit)]
 
 
-def _carries(skeleton: Skeleton, hand: HandMap, tip: int) -> bool:
+def _carries_others(skeleton: Skeleton, hand: HandMap, tip: int) -> bool:
     """Whether other joints of the hand hang off a tip, so that it cannot follow a finger."""
     others = (hand.wrist, *hand.joints.values(), *hand.metacarpals.values(), *hand.tips.values())
     return any(tip in skeleton.ancestors(j) for j in others)

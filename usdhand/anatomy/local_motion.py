@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from usdhand.anatomy.angles import inverse, product, turned
+from usdhand.anatomy.angles import inverse, product, rotate
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion.kinematics import scaled_joints
 from usdhand.motion.rotations import IDENTITY, Array
@@ -54,7 +54,7 @@ class LocalMotion:
 
     def between(self, joint: int, other: int) -> Array:
         """Rotation (4, frames) from the axes of ``other`` to those of ``joint``."""
-        up, down = self._way(other, joint)
+        up, down = self._path(other, joint)
         steps = [self.rotation(j) for j in up]
         steps += [inverse(self.rotation(j)) for j in down]
         if not steps:
@@ -64,13 +64,13 @@ class LocalMotion:
             result = product(step, result)
         return result
 
-    def carried(self, points: Array, start: int, end: int) -> Array:
+    def change_axes(self, points: Array, start: int, end: int) -> Array:
         """Points (3, frames) in the axes of one joint, in those of another one."""
-        up, down = self._way(start, end)
+        up, down = self._path(start, end)
         for j in up:
-            points = self.translation(j) + turned(self.rotation(j), self.scale(j) * points)
+            points = self.translation(j) + rotate(self.rotation(j), self.scale(j) * points)
         for j in down:
-            points = turned(inverse(self.rotation(j)), points - self.translation(j)) / self.scale(j)
+            points = rotate(inverse(self.rotation(j)), points - self.translation(j)) / self.scale(j)
         return points
 
     def turn(self, joint: int, reference: int) -> Array:
@@ -78,7 +78,7 @@ class LocalMotion:
         parent, q = int(self.clip.skeleton.parents[joint]), self.rotation(joint)
         return q if parent == reference else product(inverse(self.between(parent, reference)), q)
 
-    def _way(self, start: int, end: int) -> tuple[list[int], list[int]]:
+    def _path(self, start: int, end: int) -> tuple[list[int], list[int]]:
         """Joints from one up to below the lowest that is above both, and down to the other."""
         skeleton = self.clip.skeleton
         base = None if WORLD in (start, end) else skeleton.common_ancestor([start, end])

@@ -19,7 +19,7 @@ from usdhand.compiled import Bytes, Doubles, Floats, Ints, kernel
 Words = NDArray[np.uint64]
 Costs = NDArray[np.int32]
 
-NEVER = np.int32(2**30)  # the cost of a cell that no path reaches
+UNREACHED = np.int32(2**30)  # the cost of a cell that no path reaches
 BLOCK = 4  # rows and columns of cells that share one turn about the vertical
 _DIAGONAL, _ROW_BEFORE, _COLUMN_BEFORE = 0, 1, 2
 _U = np.uint64
@@ -65,8 +65,8 @@ def phase_path(
     for i in range(rows):
         starts[i + 1] = starts[i] + (high[i] - low[i]) // 4 + 1
     moves = np.zeros(starts[rows], np.uint8)
-    above = np.full(columns + 1, NEVER, np.int32)  # column j is at j + 1
-    here = np.full(columns + 1, NEVER, np.int32)
+    above = np.full(columns + 1, UNREACHED, np.int32)  # column j is at j + 1
+    here = np.full(columns + 1, UNREACHED, np.int32)
     local = np.zeros(columns, np.int32)
     positive, negative = hand[0, 0].copy(), hand[0, 1].copy()
     above[low[0]] = 0  # every path starts in the first cell
@@ -74,15 +74,17 @@ def phase_path(
         first, last = low[i], high[i]
         if i % BLOCK == 0 and len(hand) > 1:
             end = high[min(i + BLOCK, rows) - 1]
-            _turn(body_windows[i // BLOCK], hand_windows, hand, first, end, positive, negative)
+            _turn_signs(
+                body_windows[i // BLOCK], hand_windows, hand, first, end, positive, negative
+            )
         _compare(body[0, i], body[1, i], positive, negative, first, last, local)
         _accumulate(local, above, here, first, last)
-        _remember(local, above, here, first, last, moves, starts[i])
+        _store_moves(local, above, here, first, last, moves, starts[i])
         for j in range(low[max(i - 1, 0)], first + 1):  # columns that the band has left behind
-            here[j] = NEVER
-        above[low[0]] = NEVER
+            here[j] = UNREACHED
+        above[low[0]] = UNREACHED
         above, here = here, above
-    begin, end_ = _way_back(moves, starts, low, high)
+    begin, end_ = _backtrack(moves, starts, low, high)
     return begin, end_, above[high[rows - 1] + 1]
 
 
@@ -144,7 +146,7 @@ def signs_along(vectors: Floats, axes: Floats, limit: float, words: Words) -> No
 
 
 @kernel
-def _turn(
+def _turn_signs(
     window: Floats,
     hand_windows: Floats,
     hand: Words,
@@ -218,14 +220,14 @@ def sign_costs(body: Words, hand: Words, columns: Ints) -> Costs:
 def _accumulate(local: Costs, above: Costs, here: Costs, first: int, last: int) -> None:
     for j in range(_U(first), _U(last + 1)):
         here[j + _U(1)] = min(above[j], above[j + _U(1)]) + local[j]
-    left = NEVER
+    left = UNREACHED
     for j in range(_U(first), _U(last + 1)):
         left = min(here[j + _U(1)], left + local[j])
         here[j + _U(1)] = left
 
 
 @kernel
-def _remember(
+def _store_moves(
     local: Costs, above: Costs, here: Costs, first: int, last: int, moves: Bytes, offset: int
 ) -> None:
     cells = last + 1 - first
@@ -252,7 +254,7 @@ def _move(local: Costs, above: Costs, here: Costs, j: np.uint64) -> int:
 
 
 @kernel
-def _way_back(moves: Bytes, starts: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
+def _backtrack(moves: Bytes, starts: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints]:
     rows = len(low)
     first, last = np.zeros(rows, np.int64), np.zeros(rows, np.int64)
     i, j = rows - 1, high[rows - 1]

@@ -17,8 +17,8 @@ from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.motion.rotations import Array
 
 LONGEST_LAG_S = 2.0
-# Hands that move less than this tell nothing about timing.
-STILL_DEG = 1.0
+# Channels that change less than this tell nothing about timing.
+LEAST_RANGE_DEG = 1.0
 
 
 @displayed(
@@ -121,7 +121,10 @@ def find_lag(a: Array, b: Array, fps: float) -> float | None:
 
     Constant offsets do not matter. Refined below a frame by a parabola through the best three.
     """
-    if min(len(a), len(b)) < 8 or max(np.ptp(a, axis=0).max(), np.ptp(b, axis=0).max()) < STILL_DEG:
+    if (
+        min(len(a), len(b)) < 8
+        or max(np.ptp(a, axis=0).max(), np.ptp(b, axis=0).max()) < LEAST_RANGE_DEG
+    ):
         return None
     most = min(int(LONGEST_LAG_S * fps), min(len(a), len(b)) // 2)
     shifts = np.arange(-most, most + 1)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from usdhand.anatomy import SIDES, Channels, Hands, Side, fingertips
-from usdhand.anatomy.channels import all_channels, turns
+from usdhand.anatomy.channels import all_channels, joint_rotations
 from usdhand.display import displayed
 from usdhand.fill.assemble import Piece, join
 from usdhand.fill.candidates import Candidate, SearchSpace, finger_curves, finger_sources
@@ -87,12 +87,14 @@ def _hand_errors(
     truth = hands.encode(clip).select(names).values
     borders = [0, *chosen.seams, len(clip) - 1]
     spans = list(pairwise(borders))
-    used = {int(space.clips[c.segment]) for choice in chosen.choices for c in _all(choice)}
+    used = {int(space.clips[c.segment]) for choice in chosen.choices for c in _considered(choice)}
     sources = finger_sources(library, (side,), [joints], used)
     nearest = []
     best = np.empty_like(truth)
     for (a, b), choice in zip(spans, chosen.choices, strict=True):
-        options = finger_curves(_all(choice), space, sources, np.arange(b - a + 1) / clip.fps)
+        options = finger_curves(
+            _considered(choice), space, sources, np.arange(b - a + 1) / clip.fps
+        )
         nearest.append(Piece(a, b, options[0]))
         wrong = np.abs(options[1:] - truth[a : b + 1]).mean(axis=(1, 2))
         best[a : b + 1] = options[1 + int(np.argmin(wrong))]
@@ -115,7 +117,7 @@ def _hand_errors(
     return [_error(clip, hands, side, names, method, results[method]) for method in METHODS]
 
 
-def _all(choice: Choice) -> list[Candidate]:
+def _considered(choice: Choice) -> list[Candidate]:
     """The nearest candidate, then those that could be chosen."""
     return [choice.nearest, *choice.candidates]
 
@@ -127,7 +129,7 @@ def _error(
     only = replace(hands, frames={side: frames})
     other = only.decode(only.encode(clip).replaced(Channels(names, np.array(curves))), clip)
     joints = [i for i, n in enumerate(frames.names) if _channel(side, n) in names]
-    true, made = (np.stack(turns(c, frames), axis=1)[:, joints].T for c in (clip, other))
+    true, made = (np.stack(joint_rotations(c, frames), axis=1)[:, joints].T for c in (clip, other))
     angle = rot.angle_between(true, made)
     apart = fingertips(other, hand, frames) - fingertips(clip, hand, frames)
     jerk = np.diff(curves, n=3, axis=0) * clip.fps**3

@@ -24,7 +24,7 @@ from usdhand.rigs.height import REFERENCE_HEIGHT_CM, body_height
 FARTHEST_JOINT_CM = 1e7
 FARTHEST_WRIST_CM = 1e4
 # An arm whose joints move and turn less than this is still.
-STILL_CM, STILL_TURN = 0.1, 0.005
+STILL_ARM_CM, STILL_ARM_TURN = 0.1, 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def arm_motion(clip: Clip, hands: Hands, side: Side) -> ArmMotion:
     pose = forward_kinematics(clip, list({hips, chest, shoulder, elbow, hand.wrist}))
     axes = body_axes(clip.skeleton, hands)
     to_hips, to_chest = (
-        rot.conjugate(rot.multiply(pose.rotation(j), _own(clip.skeleton, j, axes)))
+        rot.conjugate(rot.multiply(pose.rotation(j), _body_axes_in_joint(clip.skeleton, j, axes)))
         for j in (hips, chest)
     )
     palm = rot.multiply(pose.rotation(hand.wrist), hands.frames[side].palm)
@@ -119,7 +119,10 @@ def _check_translations(clip: Clip, joints: Sequence[int]) -> None:
 def is_still(arm: ArmMotion) -> bool:
     """Whether nothing of an arm moves."""
     return all(
-        bool(np.ptp(values, axis=0).max() < (STILL_TURN if values.shape[1] == 4 else STILL_CM))
+        bool(
+            np.ptp(values, axis=0).max()
+            < (STILL_ARM_TURN if values.shape[1] == 4 else STILL_ARM_CM)
+        )
         for values in (arm.hips_position, arm.chest_position, arm.hips_palm, arm.chest_palm)
     )
 
@@ -179,10 +182,10 @@ def body_axes(skeleton: Skeleton, hands: Hands) -> Array:
 def _away_from_bind(
     skeleton: Skeleton, pose: Pose, joint: int, to_hips: Array, axes: Array
 ) -> Array:
-    turned = rot.multiply(pose.rotation(joint), _own(skeleton, joint, axes))
+    turned = rot.multiply(pose.rotation(joint), _body_axes_in_joint(skeleton, joint, axes))
     return rot.make_continuous(rot.multiply(to_hips, turned))
 
 
-def _own(skeleton: Skeleton, joint: int, axes: Array) -> Array:
+def _body_axes_in_joint(skeleton: Skeleton, joint: int, axes: Array) -> Array:
     """The body's axes in a joint's own axes, (4,)."""
     return rot.multiply(rot.conjugate(rot.from_matrix(skeleton.bind_rotations[joint])), axes)

@@ -74,7 +74,7 @@ def _halfway(pieces: Sequence[Piece]) -> list[Array]:
     return joined
 
 
-def soften_seams(curves: Array, seams: Sequence[int], fps: float) -> Array:
+def smooth_seams(curves: Array, seams: Sequence[int], fps: float) -> Array:
     """Curves (frames, channels) smoothed around the seams only, so that they bend no faster there.
 
     Joined pieces agree in angle and speed but not in acceleration; captured motion has no such
@@ -92,7 +92,7 @@ def soften_seams(curves: Array, seams: Sequence[int], fps: float) -> Array:
     return np.asarray(curves + weight * (smooth - curves))
 
 
-def limited(curves: Array, low: Array, high: Array, fps: float) -> Array:
+def within_limits(curves: Array, low: Array, high: Array, fps: float) -> Array:
     """Curves (frames, channels) kept within limits (channels,), without corners.
 
     Where a curve goes beyond a limit, the excess is taken off over a while before and after, too:

@@ -1,4 +1,7 @@
-"""Library segments whose arm motion is like that of a body segment: section 3.3 of the paper."""
+"""Library segments whose arm motion is like that of a body segment.
+
+Joerg, Hodgins & Safonova 2012, section 3.2.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,6 @@ class SearchSpace:
     Attributes
     ----------
     clips, firsts, lasts : (segments,) index of the clip, first and last frame at `ARM_FPS`
-    rows : a clip each, (frames, D) feature rows
     """
 
     part: Part
@@ -34,14 +36,8 @@ class SearchSpace:
     clips: NDArray[np.intp]
     firsts: NDArray[np.intp]
     lasts: NDArray[np.intp]
-    rows: tuple[NDArray[np.float32], ...]
     packed: PackedSegments
     index: SearchIndex
-
-    def segment_rows(self, segment: int) -> NDArray[np.float32]:
-        """Feature rows of one segment."""
-        rows = self.rows[int(self.clips[segment])]
-        return rows[self.firsts[segment] : self.lasts[segment] + 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +47,7 @@ class Candidate:
     Attributes
     ----------
     segment : its index in the search space
-    cost : mean squared distance of the warped arm motion (equation 2)
+    cost : mean squared distance of the warped arm motion (equation 1)
     warp : (frames,) frame of the library segment for each frame of the body segment
     stretch : what the body segment's length was multiplied by before, since the library has none
         of like length; 1 else
@@ -75,20 +71,18 @@ def search_space(
     clips: list[int] = []
     firsts: list[int] = []
     lasts: list[int] = []
-    rows: list[NDArray[np.float32]] = []
+    pieces: list[NDArray[np.float32]] = []
     for number, clip in enumerate(library.clips):
         if not set(part) <= set(clip.hands):
-            rows.append(np.empty((0, 0), np.float32))
             continue
         arms = [clip.hands[side].arm for side in part]
-        own = part_rows(arms, metric)
-        rows.append(own)
+        rows = part_rows(arms, metric)
         cut = clip.hands[part[0]].segments if as_stored else part_segments(arms, cutting)
         for first, last in cut:
             clips.append(number)
             firsts.append(first)
             lasts.append(last)
-    pieces = [rows[c][a : b + 1] for c, a, b in zip(clips, firsts, lasts, strict=True)]
+            pieces.append(rows[first : last + 1])
     packed = pack(pieces, groups=np.array(clips, dtype=np.int32))
     return SearchSpace(
         part,
@@ -97,7 +91,6 @@ def search_space(
         np.array(clips, dtype=np.intp),
         np.array(firsts, dtype=np.intp),
         np.array(lasts, dtype=np.intp),
-        tuple(rows),
         packed,
         prepare(packed),
     )

@@ -103,9 +103,9 @@ def _layer(candidates: Sequence[Candidate], curves: Array, settings: FillSetting
     costs = np.array([c.cost for c in candidates])
     if settings.pool and len(candidates) > 1:
         scale = settings.sharpness * float(np.median(costs[: settings.k])) or 1.0
-        say = np.exp(-(costs - costs[0]) / scale)
+        weights = np.exp(-(costs - costs[0]) / scale)
         sampled = curves[:, :: max(1, curves.shape[1] // COMPARED_FRAMES)]
-        costs = _mean_squares(sampled.reshape(len(candidates), -1)) @ (say / say.sum())
+        costs = _mean_squares(sampled.reshape(len(candidates), -1)) @ (weights / weights.sum())
     order = np.argsort(costs, kind="stable")[: settings.k]
     return Layer(tuple(int(i) for i in order), costs[order])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from usdhand.anatomy import Hands, Side
-from usdhand.anatomy.channels import all_channels
+from usdhand.anatomy.channels import all_channels, fingers_move
 from usdhand.display import displayed
 from usdhand.errors import InputError
 from usdhand.fill.arm import FARTHEST_WRIST_CM, ArmMotion, arm_motion
@@ -22,10 +22,8 @@ from usdhand.rigs.height import body_height
 
 # Arms are searched at this rate; fingers keep that of their clip.
 ARM_FPS = 30.0
-# Fingers that move less than this, in every channel, are still.
-STILL_DEG = 2.0
 # Angles are continuous in time, so that some go beyond a turn; no finger turns ten times.
-MOST_DEG = 3600.0
+LARGEST_ANGLE_DEG = 3600.0
 
 # Parts of a body that are filled on their own, or both hands as one.
 Part = tuple[Side, ...]
@@ -129,14 +127,12 @@ class MotionLibrary:
         return sum(c.duration for c in self.clips) / 60.0
 
 
-def fingers_moving(curves: Array) -> bool:
-    """Whether finger channels (frames, channels) in degrees have motion of their own."""
-    return bool(np.ptp(curves, axis=0).max(initial=0.0) > STILL_DEG)
-
-
 def damage(arm: Array, fingers: Array) -> str:
     """What no hand has in rows of arm motion and finger channels; "" if nothing."""
-    for name, values, most in (("arm", arm, FARTHEST_WRIST_CM), ("fingers", fingers, MOST_DEG)):
+    for name, values, most in (
+        ("arm", arm, FARTHEST_WRIST_CM),
+        ("fingers", fingers, LARGEST_ANGLE_DEG),
+    ):
         if not (worst := float(np.abs(values).max())) < most:
             return f"a value of the {name} is {worst:.3g}, which no body has"
     return ""
@@ -148,7 +144,7 @@ def library_hands(clip: Clip, hands: Hands, segmentation: Segmentation) -> dict[
     channels = hands.encode(clip)
     for side, frames in hands.frames.items():
         curves = channels.select(all_channels(side, frames.names)).values
-        if not fingers_moving(curves):
+        if not fingers_move(curves):
             continue
         arm = at_arm_rate(arm_motion(clip, hands, side), clip.fps)
         if reason := damage(pack_arm(arm), curves):

@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from usdhand.anatomy import SIDES, Channels, Hands, Side
-from usdhand.anatomy.channels import all_channels
+from usdhand.anatomy.channels import all_channels, fingers_move
 from usdhand.errors import InputError, UsageError
 from usdhand.fill.arm import ArmMotion, arm_motion, is_still
-from usdhand.fill.assemble import Piece, join, limited, soften_seams
+from usdhand.fill.assemble import Piece, join, smooth_seams, within_limits
 from usdhand.fill.candidates import (
     Candidate,
     FingerSource,
@@ -26,7 +26,7 @@ from usdhand.fill.candidates import (
 )
 from usdhand.fill.choose import Graph, choose, graph
 from usdhand.fill.duplicates import same_motion
-from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate, fingers_moving
+from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, at_arm_rate
 from usdhand.fill.limits import channel_limits
 from usdhand.fill.metric import metric_of
 from usdhand.fill.path import SegmentPath
@@ -158,10 +158,10 @@ def space_for(library: MotionLibrary, part: Part, settings: FillSettings) -> Sea
 def moving_sides(channels: Channels, hands: Hands) -> tuple[Side, ...]:
     """Hands whose fingers move."""
     own = {s: channels.select(all_channels(s, f.names)) for s, f in hands.frames.items()}
-    return tuple(side for side in SIDES if side in own and fingers_moving(own[side].values))
+    return tuple(side for side in SIDES if side in own and fingers_move(own[side].values))
 
 
-def _held(curves: Array) -> Array:
+def _hold_typical_pose(curves: Array) -> Array:
     """Curves (frames, channels) that hold one pose, that of the frame nearest to the mean."""
     away = np.square(curves - curves.mean(axis=0)).sum(axis=1)
     return np.repeat(curves[[int(np.argmin(away))]], len(curves), axis=0)
@@ -283,11 +283,11 @@ def _fill_part(
         joined = join(pieces, settings.blend)
         seams = tuple(piece.first for piece in pieces[1:])
         if settings.blend == "smooth":
-            joined = soften_seams(joined, seams, fps)
+            joined = smooth_seams(joined, seams, fps)
         choices = _choices(path, network, found, cut)
-        fingers = limited(joined, low, high, fps)
+        fingers = within_limits(joined, low, high, fps)
         if all(map(is_still, arms)):
-            fingers = _held(fingers)
+            fingers = _hold_typical_pose(fingers)
         alternatives.append(Alternative(names, fingers, choices, path.cost, seams))
     candidates = int(np.isin(space.clips, list(usable)).sum())
     return FilledPart(part, tuple(joints), space, candidates, network, tuple(alternatives))

@@ -1,7 +1,7 @@
-"""How alike two arm motions are: the features that metrics of fill weigh.
+"""Distances of two arm motions: the features that metrics of fill weigh.
 
 A metric turns an `ArmMotion` into feature rows whose squared Euclidean distance is the local cost
-of Joerg, Hodgins & Safonova 2012, section 3.3: centimetres and degrees, weighted.
+of Joerg, Hodgins & Safonova 2012, section 3.2: centimetres and degrees, weighted.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from usdhand.motion.rotations import Array
 
 # Alternatives differ in at least this share of their segments.
 DISTINCT_SHARE = 0.25
-STRENGTHS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1e4)
+PENALTY_STRENGTHS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1e4)
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def transition_cost(
     first_velocity: Array,
     weights: tuple[float, float],
 ) -> Array:
-    """Cost (a, b) of going from each of ``a`` candidates to each of ``b`` (equation 3).
+    """Cost (a, b) of going from each of ``a`` candidates to each of ``b`` (equation 2).
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def alternative_paths(
         for path in found:
             for layer, node in enumerate(path.nodes):
                 penalty[layer][node] += 1.0
-        for strength in STRENGTHS:
+        for strength in PENALTY_STRENGTHS:
             dearer = [n + strength * typical * p for n, p in zip(nodes, penalty, strict=True)]
             path = best_path(dearer, edges)
             if all(_difference(path, other) >= DISTINCT_SHARE for other in found):

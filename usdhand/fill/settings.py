@@ -97,7 +97,7 @@ class Segmentation:
             )
 
 
-# Section 3.2: no segment under 0.33 s, none over 2 s.
+# Section 3.1: no segment under 0.33 s, none over 2 s.
 PAPER_SEGMENTATION = Segmentation(speed=10.0, shortest=0.33, longest=2.0)
 
 
@@ -111,9 +111,9 @@ class FillSettings:
     metric : of arm motion: the name of one of `METRICS`, or one of your own
     k : candidates a segment
     factor : largest ratio of lengths of a segment and its candidate
-    pool : neighbours that say which of them is typical; 0: no opinion
+    pool : nearest segments whose fingers tell which of them is typical; 0: none, the cost alone
     segmentation : how the motion is cut; None: as the library is
-    sharpness : how fast a neighbour's say fades with its cost
+    sharpness : how fast the weight of one of the pool falls with its cost
     segment_weight, transition_weight : of both costs on the path
     scaled : bring both costs to the same average first, as the paper wants them
     repeat_weight : of playing one piece of the library twice in a row, in usual transition costs

@@ -58,7 +58,7 @@ def resample(clip: Clip, fps: float) -> Clip:
     )
 
 
-def in_time_of(body: Clip, other: Clip) -> Clip:
+def resample_like(body: Clip, other: Clip) -> Clip:
     """Return a body at the frames of another clip, from its first frame on, its ends held."""
     seconds = np.arange(len(other)) / other.fps
     frames = np.clip(seconds * body.fps, 0, len(body) - 1)

@@ -49,7 +49,7 @@ class Errors:
         return float(self.max.max(initial=0.0))
 
     def of_channels(self, names: Sequence[str], fingertips: Array) -> Errors:
-        """Return the errors of some channels, with other ``fingertips`` (see `distances`)."""
+        """Return the errors of some channels, with other ``fingertips`` (see `distances_mm`)."""
         index = {name: i for i, name in enumerate(self.names)}
         chosen = [index[name] for name in names]
         return Errors(
@@ -66,7 +66,7 @@ def measure_errors(truth: Channels, other: Channels, fingertips: Array) -> Error
 
     Parameters
     ----------
-    fingertips : (frames, tips) mm, see `distances`
+    fingertips : (frames, tips) mm, see `distances_mm`
     """
     rms, largest = np.zeros(len(truth)), np.zeros(len(truth))
     pairs = zip(truth.values.T, other.select(truth.names).values.T, strict=True)
@@ -84,7 +84,7 @@ def measure_errors(truth: Channels, other: Channels, fingertips: Array) -> Error
     )
 
 
-def distances(a: Array, b: Array) -> Array:
+def distances_mm(a: Array, b: Array) -> Array:
     """(frames, tips) distances in mm of two sets of points (frames, tips, 3) in cm."""
     return np.asarray(10.0 * np.linalg.norm(b - a, axis=-1))
 
@@ -92,8 +92,8 @@ def distances(a: Array, b: Array) -> Array:
 def pca_rms(curves: Array, components: int) -> float:
     """RMS error in degrees, over all channels, of the best linear model of that size.
 
-    The yardstick of Joerg & O'Sullivan 2009, section 6: the smallest error that any linear
-    reduction of curves (frames, channels) can have, at the price of controls that mean nothing.
+    The smallest error that any linear reduction of curves (frames, channels) can have, at the price
+    of controls that mean nothing; named beside the method by Joerg & O'Sullivan 2009, section 6.
     """
     centred = curves - curves.mean(axis=0)
     variances = np.linalg.eigvalsh(centred.T @ centred / len(curves))[::-1]

@@ -26,6 +26,8 @@ SAME_DISTANCE = 1e-7
 # A curve whose range is below this is constant whatever the threshold: what float32 leaves of a
 # joint that does not move cannot be standardised.
 SMALLEST_RANGE_DEG = 1e-6
+# A further controller must lower a channel's error by this share, else it only adds clutter.
+WORTHWHILE_GAIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +182,3 @@ def _chosen_controllers(
             break
         chosen.append(best)
     return chosen
-
-
-# A further controller must lower a channel's error by this share, else it only adds clutter.
-WORTHWHILE_GAIN = 0.05

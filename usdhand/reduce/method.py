@@ -11,7 +11,7 @@ from usdhand.anatomy.channels import Channels, Hands
 from usdhand.display import displayed
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
-from usdhand.reduce.errors import Errors, distances, measure_errors
+from usdhand.reduce.errors import Errors, distances_mm, measure_errors
 from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.search import thresholds_for_count, thresholds_for_error
@@ -135,7 +135,7 @@ def apply_rig(
     reduced = source.replaced(rig.evaluate(free))
     model = reduced.replaced(source.select(rig.names))
     tips, model_tips, reduced_tips = (hands.fingertips(clip, c) for c in (None, model, reduced))
-    total = measure_errors(source, reduced, distances(tips, reduced_tips))
+    total = measure_errors(source, reduced, distances_mm(tips, reduced_tips))
     return Reduction(
         clip,
         hands,
@@ -143,8 +143,8 @@ def apply_rig(
         source,
         free,
         reduced,
-        errors=total.of_channels(rig.names, distances(model_tips, reduced_tips)),
-        model_errors=total.of_channels(tuple(rig.held), distances(tips, model_tips)),
+        errors=total.of_channels(rig.names, distances_mm(model_tips, reduced_tips)),
+        model_errors=total.of_channels(tuple(rig.held), distances_mm(tips, model_tips)),
         total_errors=total,
     )
 

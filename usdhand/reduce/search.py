@@ -29,7 +29,7 @@ def thresholds_for_count(statistics: Statistics, count: int, fit: Fit = "paper")
     if count >= statistics.moving(0.0).sum():
         return Thresholds(0.0, 0.0)
     best: tuple[tuple[int, float, float], Thresholds] | None = None
-    for limit, rmsds, roots in _options(statistics):
+    for limit, rmsds, roots in _threshold_choices(statistics):
         free = _free(statistics, limit, roots)
         allowed = np.flatnonzero((free <= count) & (free >= (-best[0][0] if best else 0)))
         if len(allowed) == 0:
@@ -56,7 +56,7 @@ def thresholds_for_error(statistics: Statistics, most: float, fit: Fit = "paper"
     if not most > 0:
         raise QualityError(f"An RMS error of at most {most:g} degrees cannot be met: give > 0.")
     best: tuple[tuple[int, float, float], Thresholds] | None = None
-    for limit, rmsds, roots in _options(statistics):
+    for limit, rmsds, roots in _threshold_choices(statistics):
         if statistics.std[~statistics.moving(limit)].max(initial=0.0) > most:
             break  # a larger limit holds still more channels
         errors = _errors(statistics, limit, roots, fit)
@@ -77,19 +77,13 @@ def errors_by_count(statistics: Statistics, fit: Fit = "paper") -> Array:
     """
     n = len(statistics.mean)
     squared = np.full(n + 1, np.inf)
-    for limit, _, roots in _options(statistics):
+    for limit, _, roots in _threshold_choices(statistics):
         errors = np.sum(_errors(statistics, limit, roots, fit) ** 2, axis=1)
         np.minimum.at(squared, _free(statistics, limit, roots), errors)
     return np.sqrt(np.where(np.isfinite(squared), squared, np.nan) / max(n, 1))
 
 
-def channel_errors(statistics: Statistics, thresholds: Thresholds, fit: Fit) -> Array:
-    """(n,) RMS error in degrees of every channel, without making a single curve."""
-    roots = controllers_at(statistics, thresholds.range, np.array([thresholds.rmsd]))
-    return np.asarray(_errors(statistics, thresholds.range, roots, fit)[0])
-
-
-def _options(statistics: Statistics) -> Iterator[tuple[float, Array, NDArray[np.intp]]]:
+def _threshold_choices(statistics: Statistics) -> Iterator[tuple[float, Array, NDArray[np.intp]]]:
     """All that thresholds can do: a range threshold, all rmsds (k,), controllers (k, n) at each."""
     for limit in (0.0, *(_distinct(statistics.range, SAME_DEG) + 2 * SAME_DEG)):
         moving = statistics.moving(limit)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from usdhand.compiled import Bytes, Codes, Doubles, Floats, Ints, kernel
-from usdhand.search.tiles import NEVER, first_frame, last_frame
+from usdhand.search.tiles import UNREACHED, first_frame, last_frame
 
 _CHUNK = 512
 _U = np.uint64
@@ -237,10 +237,10 @@ def box_bounds(
 
 @kernel
 def lowest(bounds: Floats, count: int) -> Ints:
-    """Positions of the ``count`` lowest bounds below `NEVER`, fewer where there are fewer."""
+    """Positions of the ``count`` lowest bounds below `UNREACHED`, fewer where there are fewer."""
     positions = np.empty(count, np.int64)
     found = 0
-    highest = NEVER
+    highest = UNREACHED
     for position in range(len(bounds)):
         if bounds[position] < highest:
             at = min(found, count - 1)

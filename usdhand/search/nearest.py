@@ -16,7 +16,7 @@ from usdhand.search.segments import PackedSegments
 # Queries whose bounds are in memory at once: few for a large library, many for a small one, since
 # each batch starts its threads anew.
 _BATCH = 20
-_ROOM_BYTES = 64e6
+_BUFFER_BYTES = 64e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,19 +84,19 @@ def search(
     prepared = [prepare_query(index, queries[number], max_ratio) for number in asked.tolist()]
     most = max(query.last - query.first for query in prepared)
     rows = 1 + len(STAGES) if prune else 1
-    size = min(len(prepared), max(_BATCH, int(_ROOM_BYTES / (4 * rows * max(most, 1)))))
-    room = np.empty((size, rows, most), np.float32)
+    size = min(len(prepared), max(_BATCH, int(_BUFFER_BYTES / (4 * rows * max(most, 1)))))
+    buffer = np.empty((size, rows, most), np.float32)
     for start in range(0, len(prepared), size):
         batch = prepared[start : start + size]
         forbidden = excluded[asked[start : start + len(batch)]]
         if prune:
-            _fill_bounds(index, batch, threads, room)
+            _fill_bounds(index, batch, threads, buffer)
         else:
-            _fill_costs(index, batch, forbidden, k, threads, room[:, 0])
+            _fill_costs(index, batch, forbidden, k, threads, buffer[:, 0])
 
         def answer(first: int, last: int, start: int = start) -> None:
             for number in range(start + first, start + last):
-                query, own = prepared[number], room[number - start]
+                query, own = prepared[number], buffer[number - start]
                 if prune:
                     found, cost = nearest(index, query, own, excluded[asked[number]], k)
                 else:
@@ -205,7 +205,7 @@ def _fill_costs(
 ) -> None:
     """Accumulated costs (queries, candidates of a query), infinite for the hopeless."""
     from usdhand.search.scan import scan
-    from usdhand.search.tiles import NEVER
+    from usdhand.search.tiles import UNREACHED
 
     step = index.code_step.astype(np.float32)
     middle = CODES / 2 * index.code_step
@@ -219,7 +219,7 @@ def _fill_costs(
     margins = np.array([query.margin for query in batch])
     errors = np.array([query.error for query in batch])
     costs[:] = np.inf
-    worst = np.full(len(batch), NEVER)
+    worst = np.full(len(batch), UNREACHED)
 
     def fill(start: int, stop: int) -> None:
         scan(

@@ -34,12 +34,12 @@ def nearest(
     ids, costs
     """
     from usdhand.search.boxes import lowest
-    from usdhand.search.tiles import NEVER, warp_some
+    from usdhand.search.tiles import UNREACHED, warp_some
 
     here = slice(query.first, query.last)
     begins, lengths = index.begins[here], index.lengths[here]
     bounds = bounds[:, : len(begins)]
-    bounds[0, np.isin(index.groups[here], excluded[excluded >= 0])] = NEVER
+    bounds[0, np.isin(index.groups[here], excluded[excluded >= 0])] = UNREACHED
     step = index.code_step.astype(np.float32)
 
     def warped(positions: NDArray[np.int64], frames: int) -> NDArray[np.float32]:
@@ -48,8 +48,8 @@ def nearest(
     tried = np.sort(lowest(bounds[0], max(_SEEDS, 2 * k)))
     costs = warped(tried, len(query))
     worst = kth_smallest(costs, k)
-    bounds[0, tried] = NEVER
-    rest = np.flatnonzero((bounds[0] <= query.limit(worst)) & (bounds[0] < NEVER))
+    bounds[0, tried] = UNREACHED
+    rest = np.flatnonzero((bounds[0] <= query.limit(worst)) & (bounds[0] < UNREACHED))
     rest = rest[np.argsort(bounds[0, rest], kind="stable")]
     size = _ROUND
     while len(rest) and bounds[0, rest[0]] <= query.limit(worst):

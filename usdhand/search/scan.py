@@ -11,19 +11,19 @@ import numpy as np
 from usdhand.compiled import Codes, Doubles, Floats, Groups, Ints, kernel
 from usdhand.search.index import CODES, UNROLL
 from usdhand.search.tiles import (
-    FAR,
     LANES,
-    NEVER,
+    PADDING,
+    UNREACHED,
     first_frame,
+    init_state,
     lane_costs,
     last_frame,
-    rooms,
-    set_out,
+    workspace,
 )
 
 _U = np.uint64
 _MIDDLE = np.float32(CODES / 2)
-_LOOKS = 16  # how often to look which cells of a tile are beyond the k-th best
+_NARROWINGS = 16  # how often to look which cells of a tile are beyond the k-th best
 
 
 @kernel
@@ -66,8 +66,8 @@ def scan(
     costs : (queries, candidates of the query) output, left alone for those excluded and those
         that are further away than k others
     """
-    tile, state, local = rooms(frames.shape[1] + 1, lengths[stop - 1])
-    best = np.full((len(ranges), k), NEVER)
+    tile, state, local = workspace(frames.shape[1] + 1, lengths[stop - 1])
+    best = np.full((len(ranges), k), UNREACHED)
     found = np.empty(LANES, np.float32)
     lane_begins = np.empty(LANES, np.int64)
     lane_lengths = np.empty(LANES, np.int64)
@@ -88,18 +88,18 @@ def scan(
             limit = (np.sqrt(kth * slacks[query]) + margins[query]) ** 2 * slacks[query]
             limit += errors[query]
             low, high = 0, longest
-            set_out(state)
-            for look in range(_LOOKS):
+            init_state(state)
+            for narrowing in range(_NARROWINGS):
                 row_first, row_last = low, high
-                for i in range(n * look // _LOOKS, n * (look + 1) // _LOOKS):
+                for i in range(n * narrowing // _NARROWINGS, n * (narrowing + 1) // _NARROWINGS):
                     row_first = max(first_frame(i, n, shortest), low)
                     row_last = min(last_frame(i, n, longest), high)
                     if row_first > row_last:
                         break
                     advance_products(own, own_squares, i, tile, row_first, row_last, state, local)
                     high = row_last + 2
-                if n * (look + 1) // _LOOKS:
-                    row = n * (look + 1) // _LOOKS - 1
+                if n * (narrowing + 1) // _NARROWINGS:
+                    row = n * (narrowing + 1) // _NARROWINGS - 1
                     low, high = within(state, row, row_first, row_last, limit)
                 if low > high:
                     break
@@ -133,7 +133,7 @@ def fill_products(
             else:
                 for d in range(_U(width)):
                     tile[d, at] = 0.0
-                square = FAR
+                square = PADDING
             tile[_U(width), at] = square
 
 
@@ -176,10 +176,10 @@ def advance_products(
         state[stepped, to] = step
         state[arrived, to] = min(step, state[stepped_old, to] + cost)
     for x in range(two):
-        state[stepped, base + x] = NEVER
-        state[arrived, base + x] = NEVER
-        state[stepped, base + two + width + x] = NEVER
-        state[arrived, base + two + width + x] = NEVER
+        state[stepped, base + x] = UNREACHED
+        state[arrived, base + x] = UNREACHED
+        state[stepped, base + two + width + x] = UNREACHED
+        state[arrived, base + two + width + x] = UNREACHED
 
 
 @kernel

@@ -16,8 +16,8 @@ from usdhand.compiled import Codes, Features, Floats, Ints, Moves, kernel
 from usdhand.search.index import UNROLL
 
 LANES = 16
-NEVER = np.float32(1e30)  # the cost of a cell that no path reaches
-FAR = np.float32(1e12)  # a feature after the end of a lane: never part of the best path
+UNREACHED = np.float32(1e30)  # the cost of a cell that no path reaches
+PADDING = np.float32(1e12)  # a feature after the end of a lane: never part of the best path
 _U = np.uint64
 
 
@@ -114,7 +114,7 @@ def fill_tile(
                         tile[f, at] = np.float32(codes[frame, f]) * step[f]
                         tile[g, at] = np.float32(codes[frame, g]) * step[g]
                     else:
-                        tile[d, at] = tile[e, at] = tile[f, at] = tile[g, at] = FAR
+                        tile[d, at] = tile[e, at] = tile[f, at] = tile[g, at] = PADDING
 
 
 @kernel
@@ -158,18 +158,18 @@ def advance(
         state[stepped, at] = step
         state[arrived, at] = min(step, state[stepped_old, at] + cost)
     for x in range(two):
-        state[stepped, base + x] = NEVER
-        state[arrived, base + x] = NEVER
-        state[stepped, base + two + width + x] = NEVER
-        state[arrived, base + two + width + x] = NEVER
+        state[stepped, base + x] = UNREACHED
+        state[arrived, base + x] = UNREACHED
+        state[stepped, base + two + width + x] = UNREACHED
+        state[arrived, base + two + width + x] = UNREACHED
 
 
 @kernel
-def set_out(state: Floats) -> None:
+def init_state(state: Floats) -> None:
     """Ready `state` for the first row."""
     for row in range(4):
         for x in range(8 * LANES):
-            state[row, x] = NEVER
+            state[row, x] = UNREACHED
     for lane in range(LANES):  # as if a stay had led to the first frame: no other may follow
         state[3, LANES + lane] = 0.0
 
@@ -184,7 +184,7 @@ def lane_costs(
         for lane in range(LANES):
             costs[lane] = state[arrived, _U((lengths[lane] + 1) * LANES + lane)]
         return
-    costs[:] = NEVER
+    costs[:] = UNREACHED
     first, last = first_frame(stop - 1, n, shortest), last_frame(stop - 1, n, longest)
     for j in range(_U(first + 2), _U(last + 3)):
         for lane in range(_U(LANES)):
@@ -209,7 +209,7 @@ def warp_some(
     costs = np.empty(len(positions), np.float32)
     if not len(positions):
         return costs
-    tile, state, local = rooms(query.shape[1], lengths[positions[-1]])
+    tile, state, local = workspace(query.shape[1], lengths[positions[-1]])
     n = len(query)
     lane_begins = np.empty(LANES, np.int64)
     lane_lengths = np.empty(LANES, np.int64)
@@ -223,7 +223,7 @@ def warp_some(
         shortest, longest = lane_lengths[0], lane_lengths[-1]
         last = last_frame(stop - 1, n, longest)
         fill_tile(codes, step, lane_begins, lane_lengths, last + 1, tile)
-        set_out(state)
+        init_state(state)
         for i in range(stop):
             first, last = first_frame(i, n, shortest), last_frame(i, n, longest)
             advance(query, i, tile, first, last, state, local)
@@ -233,7 +233,7 @@ def warp_some(
 
 
 @kernel
-def rooms(width: int, longest: int) -> tuple[Floats, Floats, Floats]:
+def workspace(width: int, longest: int) -> tuple[Floats, Floats, Floats]:
     """Room for a tile, a state and a row of local costs."""
     cells = (longest + 8 | 1) * LANES  # odd, so that rows do not share cache sets
     return (

@@ -81,10 +81,10 @@ def anchors_of(pins: Sequence[Pin], rows: int, columns: int, fps: float) -> tupl
         column = min(round(pin.hand * fps), columns - 1)
         found[row] = (row, column, 0 if row in (0, rows - 1) else int(pin.tolerance * fps))
     ordered = tuple(found[row] for row in sorted(found))
-    return ordered if all(a[1] <= b[1] for a, b in pairwise(ordered)) else _in_order(ordered)
+    return ordered if all(a[1] <= b[1] for a, b in pairwise(ordered)) else _narrowed(ordered)
 
 
-def _in_order(anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
+def _narrowed(anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
     """Anchors that cross within their tolerances, narrowed to what a path can pass in order."""
     at, middle, slack = np.array(anchors).T
     low = np.maximum.accumulate(middle - slack)
@@ -112,7 +112,7 @@ def pinned_band(anchors: Sequence[Anchor], width: float) -> Band:
         low[x0 + 1 : x1 + 1] = np.maximum(y0 - before, centre - extent)
         high[x0 + 1 : x1 + 1] = np.minimum(y1 + after, centre + extent)
     high[0] = min(high[0], anchors[1][1] + anchors[1][2])
-    return _steady(low, high, anchors[0][1], anchors[-1][1])
+    return _whole_columns(low, high, anchors[0][1], anchors[-1][1])
 
 
 def band_along(first: NDArray[np.int64], last: NDArray[np.int64], band: Band, reach: float) -> Band:
@@ -128,7 +128,7 @@ def band_along(first: NDArray[np.int64], last: NDArray[np.int64], band: Band, re
     return Band(low, high)
 
 
-def _steady(low: Array, high: Array, first: int, last: int) -> Band:
+def _whole_columns(low: Array, high: Array, first: int, last: int) -> Band:
     """Whole columns that a path which never goes back can use."""
     least = np.clip(np.ceil(low - 1e-9), first, last).astype(np.int64)
     most = np.clip(np.floor(high + 1e-9), first, last).astype(np.int64)

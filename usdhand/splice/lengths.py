@@ -8,8 +8,8 @@ from itertools import pairwise
 from usdhand.anatomy import Hands, Side
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
+from usdhand.splice.locate import RATE, locate
 from usdhand.splice.markers import hand_markers
-from usdhand.splice.place import RATE, place
 from usdhand.splice.settings import Pin
 
 # Parts whose lengths differ by more than this factor are worth a warning; clips that begin or end
@@ -23,7 +23,7 @@ MOST_CELLS = 4 * 2**30
 ADVISED_TOLERANCE_S = 0.3
 
 
-def checked_lengths(
+def length_notes(
     body: Clip,
     hand_clip: Clip,
     pins: Mapping[Side, Sequence[Pin]],
@@ -79,7 +79,7 @@ def pin_advice(
     theirs = [hand_markers(hand_clip, hand_hands, side, 2 * RATE) for side in sides]
     whole = body.duration, hand_clip.duration
     body_is_longer = whole[0] > whole[1]
-    found = place(ours, theirs) if body_is_longer else place(theirs, ours)
+    found = locate(ours, theirs) if body_is_longer else locate(theirs, ours)
     if found is None:
         return (
             "Nothing in the longer clip is like the shorter one: are they of the same "

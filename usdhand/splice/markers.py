@@ -1,4 +1,4 @@
-"""Four virtual markers a hand, and how they move: Majkowska, Zordan & Faloutsos 2006, section 4."""
+"""Four virtual markers a hand: Majkowska, Zordan & Faloutsos 2006, sections 3 and 4."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from usdhand.motion.transforms import unit
 HALF_BREADTH, ALONG_HAND, ALONG_FOREARM = 0.6, 1.5, 0.8
 
 # What positions are measured from where a rig has no joint above the elbow.
-ROOM = "the room"
+WORLD_ORIGIN = "the room"
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Markers:
     forearm : (frames, 3) unit direction of the forearm in the axes of the palm: how the wrist bends
     facing : (frames, 2) level direction x, z to the trunk's left, None without a trunk
     fps : frames a second
-    origin : name of the joint that the positions are measured from, or `ROOM`
+    origin : name of the joint that the positions are measured from, or `WORLD_ORIGIN`
     """
 
     positions: Array
@@ -87,11 +87,11 @@ def hand_markers(clip: Clip, hands: Hands, side: Side, fps: float) -> Markers:
         np.einsum("tij,ti->tj", axes, direction),
         _facing(clip, hands, at),
         fps,
-        ROOM if origin is None else clip.skeleton.names[origin],
+        WORLD_ORIGIN if origin is None else clip.skeleton.names[origin],
     )
 
 
-def shown_at(markers: Markers, frames: Array, fps: float) -> Markers:
+def resample_markers(markers: Markers, frames: Array, fps: float) -> Markers:
     """Markers at fractional frames, as frames of another rate; the first and last one stay on."""
     return replace(
         markers,

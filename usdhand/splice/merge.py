@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from usdhand.anatomy import Channels, HandFrames, Hands, Side
-from usdhand.anatomy.channels import decode, encode, following
+from usdhand.anatomy.channels import carry_followers, decode, encode
 from usdhand.errors import UsageError
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
@@ -17,8 +17,8 @@ from usdhand.splice.phases import smoothed
 # Places within the time of one body frame at which a hand clip that runs faster is averaged.
 WITHIN_FRAME = np.array([-1.0, 0.0, 1.0]) / 3.0
 # Changes of the warp's speed, as a share of the usual speed, that show as a jolt of the fingers.
-JOLT = 0.5
-JOLT_FRAMES = 2.0
+SPEED_JUMP = 0.5
+JUMP_SMOOTHING_FRAMES = 2.0
 
 
 def with_fingers(
@@ -47,7 +47,7 @@ def with_fingers(
     times = _times_within(warp, exact) * hand_clip.fps
     curves = other.select(names).values
     taken = np.mean([interpolate(curves, t) for t in times], axis=0)
-    taken = _without_jolts(taken, warp, exact)
+    taken = _smooth_at_speed_jumps(taken, warp, exact)
     return decode(own.replaced(Channels(names, taken)), body, frames), names
 
 
@@ -89,7 +89,7 @@ def with_wrist(
     rotations[:, wrist] = rot.make_continuous(
         rot.multiply(rot.conjugate(pose.rotation(parent)), world)
     )
-    return following(body, body.with_rotations(rotations), hands.frames[side])
+    return carry_followers(body, body.with_rotations(rotations), hands.frames[side])
 
 
 def forearm_frame(skeleton: Skeleton, hands: Hands, side: Side) -> Array:
@@ -125,15 +125,15 @@ def _times_within(warp: Array, exact: Array | None) -> Array:
     return times if exact is None else np.where(exact, warp, times)
 
 
-def _without_jolts(curves: Array, warp: Array, exact: Array | None) -> Array:
+def _smooth_at_speed_jumps(curves: Array, warp: Array, exact: Array | None) -> Array:
     """Curves smoothed where, and only where, the speed of the warp jumps at no exact pin."""
     bend = np.abs(np.diff(warp, n=2, prepend=warp[:1], append=warp[-1:]))
     bend[[0, -1]] = 0.0
     usual = max((warp[-1] - warp[0]) / max(len(warp) - 1, 1), 1e-9)
-    jolts = (bend > JOLT * usual).astype(np.float64)
-    if not jolts.any():
+    jumps = (bend > SPEED_JUMP * usual).astype(np.float64)
+    if not jumps.any():
         return curves
-    share = np.minimum(1.0, 6.0 * smoothed(jolts, JOLT_FRAMES))
+    share = np.minimum(1.0, 6.0 * smoothed(jumps, JUMP_SMOOTHING_FRAMES))
     if exact is not None:
         share = np.where(exact, 0.0, share)
-    return np.asarray(curves + share[:, None] * (smoothed(curves, JOLT_FRAMES) - curves))
+    return np.asarray(curves + share[:, None] * (smoothed(curves, JUMP_SMOOTHING_FRAMES) - curves))

@@ -20,11 +20,11 @@ from usdhand.splice.band import (
     checked_pins,
     pinned_band,
 )
-from usdhand.splice.fingers import held_poses, moving_fingers
-from usdhand.splice.lengths import checked_lengths, pin_advice
+from usdhand.splice.finger_notes import held_pose_notes, still_finger_notes
+from usdhand.splice.lengths import length_notes, pin_advice
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.merge import with_fingers, with_wrist
-from usdhand.splice.phases import phase_path, settled, smoothed, steadied
+from usdhand.splice.phases import path_with_steady_turns, phase_path, rematched, smoothed
 from usdhand.splice.quality import Phase, phase_qualities
 from usdhand.splice.refine import refined
 from usdhand.splice.settings import Pin, SpliceSettings
@@ -32,11 +32,11 @@ from usdhand.splice.warps import through_pins
 
 # A hand whose wrist stays within this of its mean, in lengths of the palm, does not move; and one
 # that goes less than this share as far as the other one tells less about timing than that.
-STILL, LEAST_SHARE = 0.1, 0.1
+STILL_RANGE, LEAST_RANGE_SHARE = 0.1, 0.1
 # The band of pass 2 is not wider, in seconds, however long the clips.
 MOST_BAND_S = 10.0
 # Beside a pin, a matched warp may move by its tolerance and this share of the time to the pin.
-ROOM_SHARE = 0.25
+FREEDOM_SHARE = 0.25
 # Rounds of matching signs with the hand clip in the body's time.
 ROUNDS = 2
 # Of a hand's alignment, for whoever watches: the path of pass 1, its rounds, and pass 2.
@@ -149,7 +149,7 @@ def splice(
     for pin in settings.pins:
         if pin.side is not None and pin.side not in sides:
             raise UsageError(f"Pin {pin} is for the {pin.side} hand, which is not spliced.")
-    notes = checked_lengths(
+    notes = length_notes(
         body,
         hand_clip,
         pins,
@@ -158,7 +158,7 @@ def splice(
         lambda: pin_advice(body, hand_clip, body_hands, hand_hands, sides),
     )
     found, more = _aligned_hands(body, hand_clip, body_hands, hand_hands, settings, pins, progress)
-    notes += more + moving_fingers(body, hand_clip, body_hands, hand_hands, sides)
+    notes += more + still_finger_notes(body, hand_clip, body_hands, hand_hands, sides)
     clip, hands = body, {}
     for side, alignment in found.items():
         warp = alignment.warp[:, 1]
@@ -168,7 +168,7 @@ def splice(
         frames, other = body_hands.frames[side], hand_hands.frames[side]
         clip, names = with_fingers(clip, hand_clip, frames, other, warp, exact)
         hands[side] = replace(alignment, channels=names)
-    notes += held_poses(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
+    notes += held_pose_notes(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
     return Spliced(clip, hands, tuple(notes), settings)
 
 
@@ -192,16 +192,16 @@ def align(
     reach = max(reach, settings.least_band * settings.fps) / 2
     if settings.align == "local":
         near = band_along(path.first, path.last, band, reach)
-        path = steadied(body, hand, path, near, *signs, settings.directions)
+        path = path_with_steady_turns(body, hand, path, near, *signs, settings.directions)
     steps.add()
     own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps
-    room = _room(own_times, pins)
+    freedom = _freedom(own_times, pins)
     first = path.open_ended
     for _ in range(ROUNDS):
         first = through_pins(first / hand.fps, own_times, pins) * hand.fps
         signs = settings.shared_smoothing, settings.dead_zone
-        first = settled(
-            body, hand, first, room * body.fps, *signs, settings.align, settings.directions
+        first = rematched(
+            body, hand, first, freedom * body.fps, *signs, settings.align, settings.directions
         )
         steps.add()
 
@@ -214,7 +214,9 @@ def align(
         return in_time(first), in_time(first), path.cost
     tether = settings.tether * hand.fps
     first = through_pins(first / hand.fps, own_times, pins) * hand.fps
-    second = refined(body, hand, first, np.minimum(room * hand.fps, reach), settings.align, tether)
+    second = refined(
+        body, hand, first, np.minimum(freedom * hand.fps, reach), settings.align, tether
+    )
     steps.add()
     return in_time(second), in_time(first), path.cost
 
@@ -229,17 +231,17 @@ def _exact_frames(alignment: Alignment) -> Array:
     return exact
 
 
-def _room(times: Array, pins: Sequence[Pin]) -> Array:
+def _freedom(times: Array, pins: Sequence[Pin]) -> Array:
     """Seconds (times,) by which a warp that goes through all pins may still move.
 
     Where a pin demands a jump, the hand clip as shown around it moves as no hand does, so that
     matching it again would tell nothing.
     """
-    room = np.full(len(times), np.inf)
+    freedom = np.full(len(times), np.inf)
     for pin in pins:
         away = np.maximum(np.abs(times - pin.body) - 0.75 * times[1], 0.0)
-        np.minimum(room, pin.tolerance + ROOM_SHARE * away, out=room)
-    return room
+        np.minimum(freedom, pin.tolerance + FREEDOM_SHARE * away, out=freedom)
+    return freedom
 
 
 def first_band(rows: int, columns: int, settings: SpliceSettings, pins: Sequence[Pin]) -> Band:
@@ -266,8 +268,10 @@ def _aligned_hands(
         )
         for side in pins
     }
-    reach = {s: min(_reach(m, settings.smoothing) for m in both) for s, both in markers.items()}
-    enough = max(STILL, LEAST_SHARE * max(reach.values()))
+    reach = {
+        s: min(_wrist_range(m, settings.smoothing) for m in both) for s, both in markers.items()
+    }
+    enough = max(STILL_RANGE, LEAST_RANGE_SHARE * max(reach.values()))
     still = [side for side in pins if reach[side] < enough]
     steps = Steps(STEPS * (len(pins) - len(still)), progress)
     found = {
@@ -278,7 +282,11 @@ def _aligned_hands(
     notes = []
     if not found:
         ends = body.duration, hand_clip.duration
-        found = {s: _as_pinned(*markers[s], p, times) for s, p in pins.items() if _fix(p, *ends)}
+        found = {
+            s: _aligned_by_pins(*markers[s], p, times)
+            for s, p in pins.items()
+            if _pins_fix_both_ends(p, *ends)
+        }
         if found:
             notes.append("no hand moves: the timing is that of the pins, and even between them")
     if not found:
@@ -286,7 +294,9 @@ def _aligned_hands(
         at_rest = [
             name
             for name, k in clips.items()
-            if all(_reach(both[k], settings.smoothing) < STILL for both in markers.values())
+            if all(
+                _wrist_range(both[k], settings.smoothing) < STILL_RANGE for both in markers.values()
+            )
         ]
         where = " and ".join(at_rest) or f"both {body.name} and {hand_clip.name}"
         raise InputError(
@@ -295,8 +305,10 @@ def _aligned_hands(
         )
     for side in (s for s in still if s not in found):
         [(moving, alignment)] = found.items()
-        found[side] = _following(alignment, moving, pins[side], times)
-        body_rests, hand_rests = (_reach(m, settings.smoothing) < enough for m in markers[side])
+        found[side] = _aligned_like_other_hand(alignment, moving, pins[side], times)
+        body_rests, hand_rests = (
+            _wrist_range(m, settings.smoothing) < enough for m in markers[side]
+        )
         where = "the hand clip" if not body_rests else "both clips" if hand_rests else "the body"
         notes.append(
             f"the {side} hand hardly moves in {where}: it follows the timing of the {moving} one"
@@ -326,7 +338,7 @@ def _aligned(
     )
 
 
-def _fix(pins: Sequence[Pin], body: float, hand: float) -> bool:
+def _pins_fix_both_ends(pins: Sequence[Pin], body: float, hand: float) -> bool:
     """Whether pins say where one of the clips begins and where one ends."""
     if len(pins) < 2:
         return False
@@ -335,21 +347,25 @@ def _fix(pins: Sequence[Pin], body: float, hand: float) -> bool:
     return begin < 1e-3 and min(body - last.body, hand - last.hand) < 1e-3
 
 
-def _as_pinned(ours: Markers, theirs: Markers, pins: tuple[Pin, ...], times: Array) -> Alignment:
+def _aligned_by_pins(
+    ours: Markers, theirs: Markers, pins: tuple[Pin, ...], times: Array
+) -> Alignment:
     """Alignment by pins alone, evenly between them."""
     warp = np.interp(times, [p.body for p in pins], [p.hand for p in pins])
     joint = np.stack([times, warp], axis=1)
     return Alignment(joint, warp, pins, 0.0, (), (ours.origin, theirs.origin))
 
 
-def _reach(markers: Markers, smoothing: float) -> float:
+def _wrist_range(markers: Markers, smoothing: float) -> float:
     """How far a wrist goes from its mean, in lengths of the palm."""
     wrist = smoothed(markers.wrist, smoothing * markers.fps)
     far = np.linalg.norm(wrist - wrist.mean(axis=0), axis=-1).max()
     return float(far / max(markers.palm_length, 1e-9))
 
 
-def _following(alignment: Alignment, side: Side, pins: tuple[Pin, ...], times: Array) -> Alignment:
+def _aligned_like_other_hand(
+    alignment: Alignment, side: Side, pins: tuple[Pin, ...], times: Array
+) -> Alignment:
     warp = through_pins(alignment.warp[:, 1], times, pins, np.inf)
     return replace(
         alignment, warp=np.stack([times, warp], axis=1), pins=pins, phases=(), taken_from=side

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from usdhand.motion.rotations import Array
 from usdhand.splice.band import Band
-from usdhand.splice.markers import Markers, shown_at
+from usdhand.splice.markers import Markers, resample_markers
 from usdhand.splice.settings import Align, Directions
-from usdhand.splice.warps import EXACT, monotone, stiff
+from usdhand.splice.warps import EXACT, monotone, whittaker_smoothed
 
 WINDOW = 5  # frames of the window that a turn about the vertical is fitted to
 TURNS = 32
@@ -81,7 +81,7 @@ def phase_path(
 
     turns = phase_dtw.turn_angles(TURNS) if align == "local" else np.zeros(1)
     if align == "trunk":
-        body, hand = (facing_forward(m) for m in (body, hand))
+        body, hand = (in_trunk_axes(m) for m in (body, hand))
     ours = derivative_signs(body, smoothing, dead_zone, np.zeros(1), directions)
     theirs = derivative_signs(hand, smoothing, dead_zone, turns, directions)
     windows = [_windows(m, smoothing, phase_dtw.BLOCK) for m in (body, hand)]
@@ -97,7 +97,7 @@ def phase_path(
     return WarpPath(first, last, int(cost))
 
 
-def steadied(
+def path_with_steady_turns(
     body: Markers,
     hand: Markers,
     path: WarpPath,
@@ -124,11 +124,11 @@ def steadied(
     return WarpPath(first, last, int(cost))
 
 
-def settled(
+def rematched(
     body: Markers,
     hand: Markers,
     warp: Array,
-    room: Array,
+    freedom: Array,
     smoothing: float,
     dead_zone: float,
     align: Align = "local",
@@ -142,16 +142,16 @@ def settled(
 
     Parameters
     ----------
-    room : (rows,) body frames by which the warp may move, 0: not at all
+    freedom : (rows,) body frames by which the warp may move, 0: not at all
     """
     from usdhand.dtw import phases as phase_dtw
 
     rows = np.arange(len(body))
     ours, theirs = (
         derivative_signs(m, smoothing, dead_zone, np.zeros(1), directions)
-        for m in alike(body, shown_at(hand, warp, body.fps), align)
+        for m in align_about_vertical(body, resample_markers(hand, warp, body.fps), align)
     )
-    reach = np.minimum(room, NEAR_S * body.fps).astype(np.int64)
+    reach = np.minimum(freedom, NEAR_S * body.fps).astype(np.int64)
     low = np.maximum.accumulate(np.maximum(rows - reach, 0))
     high = np.minimum.accumulate(np.minimum(rows + reach, rows[-1])[::-1])[::-1]
     first, last, cost = phase_dtw.phase_path(ours[0], theirs, *_NO_TURN, low, high)
@@ -159,15 +159,15 @@ def settled(
     weights = _evidence(ours[0], theirs[0], path.middle, SHIFT_S * body.fps)
     weights[[0, -1]] = 1.0
     weights[(warp < 0.0) | (warp > len(hand) - 1.0)] = LEAST_EVIDENCE
-    weights[room == 0] = EXACT
+    weights[freedom == 0] = EXACT
     matched = np.interp(path.open_ended, rows, warp)
-    return monotone(stiff(matched, weights, STIFFNESS * (body.fps / 60.0) ** 4))
+    return monotone(whittaker_smoothed(matched, weights, STIFFNESS * (body.fps / 60.0) ** 4))
 
 
-def alike(body: Markers, hand: Markers, align: Align) -> tuple[Markers, Markers]:
+def align_about_vertical(body: Markers, hand: Markers, align: Align) -> tuple[Markers, Markers]:
     """Both markers, of as many frames, in axes that they share."""
     if align == "trunk":
-        return facing_forward(body), facing_forward(hand)
+        return in_trunk_axes(body), in_trunk_axes(hand)
     turns = steady_turns(body, hand, np.arange(len(body), dtype=np.float64))
     return facing(body, -turns), hand
 
@@ -259,7 +259,7 @@ def sign_axes(directions: Directions) -> Array:
     return np.stack([_about_vertical(axes, np.radians(a)) for a in (0.0, 45.0, 22.5, 67.5)])
 
 
-def facing_forward(markers: Markers) -> Markers:
+def in_trunk_axes(markers: Markers) -> Markers:
     """Markers in axes that turn with the trunk."""
     assert markers.facing is not None
     return facing(markers, np.arctan2(markers.facing[:, 1], markers.facing[:, 0]))

@@ -8,10 +8,10 @@ import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import unit
-from usdhand.splice.markers import Markers, shown_at
-from usdhand.splice.phases import alike, smoothed
+from usdhand.splice.markers import Markers, resample_markers
+from usdhand.splice.phases import align_about_vertical, smoothed
 from usdhand.splice.settings import Align
-from usdhand.splice.warps import EXACT, monotone, stiff
+from usdhand.splice.warps import EXACT, monotone, whittaker_smoothed
 
 # Standard deviations of Gaussians in seconds: of what is compared; of the mean that positions and
 # directions are compared around, as performers stand and reach differently; of the time over which
@@ -25,29 +25,29 @@ ROUNDS = 4
 
 
 def refined(
-    body: Markers, hand: Markers, warp: Array, room: Array, align: Align, tether: float
+    body: Markers, hand: Markers, warp: Array, freedom: Array, align: Align, tether: float
 ) -> Array:
     """Warp (rows,) of pass 1 moved to where both hands are most alike, by a part of a frame.
 
     The paper compares the angle between the palms with the forearms aligned, which is the one
     between the forearms in the axes of the palms and needs no alignment. Where a wrist hardly
-    bends this says nothing, so that the palm's directions and the wrist's path have a say as well.
-    Each is weighed by how well it agrees there, and a warp is bent no more than this is worth:
-    what hardly changes, or differs anyway, has no say. Only the first round weighs by how well it
+    bends this tells nothing, so that the palm's directions and the wrist's path count as well.
+    Each has the weight of how well it agrees there, and a warp is bent no more than that allows:
+    what hardly changes, or differs anyway, has none. Only the first round weighs by how well it
     agrees on the whole, since then a lag would pass for a difference.
 
     Parameters
     ----------
-    room : (rows,) hand clip frames by which the warp may move, 0: not at all
+    freedom : (rows,) hand clip frames by which the warp may move, 0: not at all
     tether : frames by which pass 1 is typically off
     """
     fps = body.fps
     independent = 1.0 / (2.0 * np.sqrt(np.pi) * SMOOTHING_S * fps)  # smoothed noise, frame by frame
-    held = np.where(room > 0, 1.0 / tether**2, EXACT)
+    held = np.where(freedom > 0, 1.0 / tether**2, EXACT)
     moved = np.zeros(len(body))
     for again in range(ROUNDS):
         now = monotone(warp + moved)
-        pair = alike(body, shown_at(hand, now, fps), align)
+        pair = align_about_vertical(body, resample_markers(hand, now, fps), align)
         slope = np.maximum(np.gradient(now), 0.1)[:, None]
         information, pull = np.zeros(len(body)), np.zeros(len(body))
         for ours, theirs, least in _compared(*pair):
@@ -60,7 +60,11 @@ def refined(
             pull += independent * _dot(rate, apart) / noise
         weights = information + held
         wanted = (information * moved + pull) / weights
-        moved = np.clip(stiff(wanted, weights, STIFFNESS * (fps / 60.0) ** 4, warp), -room, room)
+        moved = np.clip(
+            whittaker_smoothed(wanted, weights, STIFFNESS * (fps / 60.0) ** 4, warp),
+            -freedom,
+            freedom,
+        )
     return monotone(warp + moved)
 
 

@@ -18,10 +18,13 @@ JUMP = 0.25
 EXACT = 1e9
 
 
-def stiff(values: Array, weights: Array, stiffness: float, start: Array | None = None) -> Array:
+def whittaker_smoothed(
+    values: Array, weights: Array, stiffness: float, start: Array | None = None
+) -> Array:
     """Curve (n,) near values where they have weight, and bent as little as possible elsewhere.
 
-    Minimises the sum of weights * (curve - values)^2 + stiffness * (second difference)^2. At an
+    Minimises the sum of weights * (curve - values)^2 + stiffness * (second difference)^2 (Whittaker
+    1923, "On a New Method of Graduation"). At an
     exact value where the speed of the warp jumps, the curve may bend freely: else what a pin
     demands on one of its sides would swing on the other.
 
@@ -31,14 +34,14 @@ def stiff(values: Array, weights: Array, stiffness: float, start: Array | None =
     """
     exact = weights[1:-1] >= EXACT  # of frames 1 to n - 2
     if not exact.any():
-        return _bent(values, weights, np.full(len(exact), stiffness))
-    curve = _bent(values, weights, np.where(exact, 0.0, stiffness))
+        return _smoothed_with(values, weights, np.full(len(exact), stiffness))
+    curve = _smoothed_with(values, weights, np.where(exact, 0.0, stiffness))
     speed = np.diff(curve if start is None else start + curve)
     jumps = np.abs(np.diff(speed)) > JUMP * np.abs(speed[1:] + speed[:-1])
-    return _bent(values, weights, np.where(exact & jumps, 0.0, stiffness))
+    return _smoothed_with(values, weights, np.where(exact & jumps, 0.0, stiffness))
 
 
-def _bent(values: Array, weights: Array, bend: Array) -> Array:
+def _smoothed_with(values: Array, weights: Array, bend: Array) -> Array:
     """Curve of which bending costs as much at each inner frame."""
     from scipy.linalg import solveh_banded
 

@@ -40,7 +40,7 @@ from usdhand.motion.editing import (
     starting_at,
     trim,
 )
-from usdhand.motion.resample import in_time_of
+from usdhand.motion.resample import resample_like
 from usdhand.report.convert import convert_result, summary
 from usdhand.requests.convert import ConvertRequest, Edits
 from usdhand.rigs import Conventions, map_character
@@ -188,7 +188,7 @@ def retarget_hands(hands: Clip, target: Clip, conventions: Conventions | None = 
         if the two have no hand in common.
     """
     theirs = find_hands(hands, conventions)
-    body = in_time_of(target, hands)
+    body = resample_like(target, hands)
     own = find_hands(body, conventions)
     sides = [side for side in own.frames if side in theirs.frames]
     if not sides:

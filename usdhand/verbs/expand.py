@@ -10,7 +10,7 @@ from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.motion import Clip
-from usdhand.motion.resample import in_time_of
+from usdhand.motion.resample import resample_like
 from usdhand.reduce.method import expand as expand_channels
 from usdhand.report.expand import expand_result, summary
 from usdhand.requests.expand import ExpandRequest
@@ -82,5 +82,5 @@ def _expanded_onto(
     stored: usd_rig.StoredRig, target: str | Path, skel: str | None, conventions: Conventions | None
 ) -> Clip:
     body, _ = read_any(target, skel)
-    body = in_time_of(body, stored.clip)
+    body = resample_like(body, stored.clip)
     return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))

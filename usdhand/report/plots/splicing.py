@@ -16,7 +16,7 @@ from usdhand.report.plots import style
 from usdhand.report.plots.style import BLACK, GREY, ORANGE, SKY, styled
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.method import Alignment, Spliced, first_band
-from usdhand.splice.phases import derivative_signs, facing, facing_forward, steady_turns
+from usdhand.splice.phases import derivative_signs, facing, in_trunk_axes, steady_turns
 from usdhand.splice.settings import SpliceSettings
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def cost_grid(
     settings: SpliceSettings,
     shown: tuple[tuple[float, float], tuple[float, float]],
 ) -> tuple[Array, Array, Array]:
-    """Costs of pass 1 with its steadied turns, averaged over blocks of frames.
+    """Costs of pass 1 with its steady turns, averaged over blocks of frames.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def cost_grid(
     costs : (row blocks, column blocks) mean squared difference of the signs, equation (6)
     """
     if settings.align == "trunk":
-        pair = facing_forward(ours), facing_forward(theirs)
+        pair = in_trunk_axes(ours), in_trunk_axes(theirs)
     else:
         times = np.arange(len(ours)) / ours.fps
         warp = np.interp(times, *alignment.warp.T) * theirs.fps

@@ -7,18 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from usdhand.anatomy import HandFrames, Hands, Side
-from usdhand.anatomy.channels import encode
+from usdhand.anatomy.channels import encode, fingers_move
 from usdhand.errors import InputError
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 
-# Fingers none of whose channels changes by as many degrees do not move.
-STILL_DEG = 2.0
 # The last pose of a hand clip that stays for as many seconds is worth a note.
 HELD_S = 0.5
 
 
-def moving_fingers(
+def still_finger_notes(
     body: Clip, hand_clip: Clip, body_hands: Hands, hand_hands: Hands, sides: Sequence[Side]
 ) -> list[str]:
     """Notes on hands whose fingers do not move in the hand clip.
@@ -42,7 +40,7 @@ def moving_fingers(
     return notes
 
 
-def held_poses(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) -> list[str]:
+def held_pose_notes(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) -> list[str]:
     """Notes on hands that hold the hand clip's first or last pose for long.
 
     Parameters
@@ -66,5 +64,4 @@ def held_poses(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) -> list
 
 
 def _move(clip: Clip, frames: HandFrames) -> bool:
-    values = encode(clip, frames).values
-    return bool(values.size and np.ptp(values, axis=0).max() > STILL_DEG)
+    return fingers_move(encode(clip, frames).values)

@@ -18,7 +18,7 @@ SMOOTHING_S = 0.1
 DISTINCT = 0.25
 
 
-def place(longer: Sequence[Markers], shorter: Sequence[Markers]) -> tuple[float, float] | None:
+def locate(longer: Sequence[Markers], shorter: Sequence[Markers]) -> tuple[float, float] | None:
     """Seconds of the longer clip at which the shorter one begins and ends, None if nowhere.
 
     The cheapest path through all of the shorter clip and any part of the longer one, from half to
@@ -42,13 +42,13 @@ def place(longer: Sequence[Markers], shorter: Sequence[Markers]) -> tuple[float,
             continue
         ways = np.stack(
             [
-                _later(costs[2], 1) + local,
-                _later(costs[2], 2) + local,
-                _later(costs[1], 1) + last + local,
+                _delayed(costs[2], 1) + local,
+                _delayed(costs[2], 2) + local,
+                _delayed(costs[1], 1) + last + local,
             ]
         )
         came = np.argmin(ways, axis=0)
-        froms = np.stack([_later(starts[2], 1), _later(starts[2], 2), _later(starts[1], 1)])
+        froms = np.stack([_delayed(starts[2], 1), _delayed(starts[2], 2), _delayed(starts[1], 1)])
         costs = [costs[1], costs[2], ways[came, order]]
         starts = [starts[1], starts[2], froms[came, order]]
     reached = np.isfinite(costs[2])
@@ -60,7 +60,7 @@ def place(longer: Sequence[Markers], shorter: Sequence[Markers]) -> tuple[float,
     return float(starts[2][end] / RATE), float(end / RATE)
 
 
-def _later(row: Array, by: int) -> Array:
+def _delayed(row: Array, by: int) -> Array:
     """A row of which every value has moved on; before its first there is no way."""
     return np.concatenate([np.full(by, np.inf), row[:-by]])
 
