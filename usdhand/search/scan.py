@@ -14,6 +14,8 @@ from usdhand.search.tiles import (
     LANES,
     PADDING,
     UNREACHED,
+    arrive,
+    end_row,
     first_frame,
     init_state,
     lane_costs,
@@ -149,12 +151,9 @@ def advance_products(
     local: Floats,
 ) -> None:
     """Like `advance`, on a tile of `fill_products`."""
-    lanes, two = _U(LANES), _U(2 * LANES)
     width = _U((last - first + 1) * LANES)
     base = _U(first * LANES)
-    row = _U(i)
-    stepped_old, stepped = (_U(0), _U(2)) if i % 2 else (_U(2), _U(0))
-    arrived_old, arrived = stepped_old + _U(1), stepped + _U(1)
+    row, old, new = _U(i), _U(2 * ((i + 1) % 2)), _U(2 * (i % 2))
     final = _U(query.shape[1] - UNROLL)
     square, norms = squares[row], _U(query.shape[1])
     for x in range(width):
@@ -169,17 +168,11 @@ def advance_products(
     q0, q1 = query[row, final], query[row, final + _U(1)]
     q2, q3 = query[row, final + _U(2)], query[row, final + _U(3)]
     for x in range(width):
-        at, to = base + x, base + two + x
+        at = base + x
         cost = local[x] + q0 * tile[final, at] + q1 * tile[final + _U(1), at]
         cost = cost + q2 * tile[final + _U(2), at] + q3 * tile[final + _U(3), at]
-        step = min(state[arrived_old, to - lanes], state[arrived_old, to - two]) + cost
-        state[stepped, to] = step
-        state[arrived, to] = min(step, state[stepped_old, to] + cost)
-    for x in range(two):
-        state[stepped, base + x] = UNREACHED
-        state[arrived, base + x] = UNREACHED
-        state[stepped, base + two + width + x] = UNREACHED
-        state[arrived, base + two + width + x] = UNREACHED
+        arrive(state, old, new, at, cost)
+    end_row(state, new, base, width)
 
 
 @kernel

@@ -127,12 +127,9 @@ def advance(
     columns begin two frames before the candidate, and two frames on either side of a row's band
     are set out of reach, which is as far as the next row looks.
     """
-    lanes, two = _U(LANES), _U(2 * LANES)
     width = _U((last - first + 1) * LANES)
     base = _U(first * LANES)
-    row = _U(i)
-    stepped_old, stepped = (_U(0), _U(2)) if i % 2 else (_U(2), _U(0))
-    arrived_old, arrived = stepped_old + _U(1), stepped + _U(1)
+    row, old, new = _U(i), _U(2 * ((i + 1) % 2)), _U(2 * (i % 2))
     final = _U(query.shape[1] - UNROLL)
     for x in range(width):
         local[x] = 0.0
@@ -148,20 +145,36 @@ def advance(
     q0, q1 = query[row, final], query[row, final + _U(1)]
     q2, q3 = query[row, final + _U(2)], query[row, final + _U(3)]
     for x in range(width):
-        at = base + two + x
         e0 = q0 - tile[final, base + x]
         e1 = q1 - tile[final + _U(1), base + x]
         e2 = q2 - tile[final + _U(2), base + x]
         e3 = q3 - tile[final + _U(3), base + x]
         cost = local[x] + (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
-        step = min(state[arrived_old, at - lanes], state[arrived_old, at - two]) + cost
-        state[stepped, at] = step
-        state[arrived, at] = min(step, state[stepped_old, at] + cost)
-    for x in range(two):
-        state[stepped, base + x] = UNREACHED
-        state[arrived, base + x] = UNREACHED
-        state[stepped, base + two + width + x] = UNREACHED
-        state[arrived, base + two + width + x] = UNREACHED
+        arrive(state, old, new, base + x, cost)
+    end_row(state, new, base, width)
+
+
+@kernel
+def arrive(state: Floats, old: np.uint64, new: np.uint64, cell: np.uint64, cost: float) -> None:
+    """Stepped and arrived costs of a cell with this local cost, from those of the row before.
+
+    ``old`` and ``new`` are where the two rows begin in the state.
+    """
+    at, one = cell + _U(2 * LANES), _U(1)
+    step = min(state[old + one, at - _U(LANES)], state[old + one, at - _U(2 * LANES)]) + cost
+    state[new, at] = step
+    state[new + one, at] = min(step, state[old, at] + cost)
+
+
+@kernel
+def end_row(state: Floats, new: np.uint64, base: np.uint64, width: np.uint64) -> None:
+    """Set two frames on either side of a row's band out of reach."""
+    behind = base + width + _U(2 * LANES)
+    for x in range(_U(2 * LANES)):
+        state[new, base + x] = UNREACHED
+        state[new + _U(1), base + x] = UNREACHED
+        state[new, behind + x] = UNREACHED
+        state[new + _U(1), behind + x] = UNREACHED
 
 
 @kernel
