@@ -1,14 +1,15 @@
 """Whether two versions of usdhand have the same results, value by value.
 
 Run: python benchmarks/same_results.py BEFORE AFTER [--real FOLDER] [--work FOLDER] [--verbs ...]
-         [--quick] [--reuse] [--all]
+         [--quick] [--reuse] [--all] [--tolerance X]
 
 BEFORE and AFTER call the two versions: a path of `usdhand`, or a command such as
 "env PYTHONPATH=/a/checkout /an/environment/bin/usdhand". Every command of same_steps.py is run with
 both, each in a folder of its own, on copies of the samples and, with --real, of real takes. Then
 all that was printed and written is compared: reports key by key (new keys are listed, and are no
 difference), USD files at all specs, fields and time samples, glTF, BVH and pages by their numbers,
-exit codes and messages. Exit 1 if anything differs that is not named as mended.
+exit codes and messages. Exit 1 if anything differs that is not named as mended; numbers that differ
+by no more than --tolerance are counted by themselves.
 """
 
 from __future__ import annotations
@@ -51,16 +52,24 @@ class Judged:
     step: Step
     files: int
     differences: tuple[Difference, ...]
+    tolerance: float
 
     @property
-    def wrong(self) -> list[Difference]:
+    def changed(self) -> list[Difference]:
         """Without what is only new."""
         return [d for d in self.differences if d.what != "new"]
 
     @property
+    def wrong(self) -> list[Difference]:
+        """Without what is only new, or near enough."""
+        return [d for d in self.changed if not d.size <= self.tolerance]
+
+    @property
     def state(self) -> str:
         """The column of the table that it counts for."""
-        return "equal" if not self.wrong else "mended" if self.step.mended else "differ"
+        if self.wrong:
+            return "mended" if self.step.mended else "differ"
+        return "near" if self.changed else "equal"
 
 
 def main() -> int:
@@ -72,6 +81,7 @@ def main() -> int:
     parser.add_argument("--verbs", nargs="+", default=[], help="these only, or 'bad' inputs")
     parser.add_argument("--quick", action="store_true", help="a part, in under two minutes")
     parser.add_argument("--reuse", action="store_true", help="what BEFORE gave in --work last time")
+    parser.add_argument("--tolerance", type=float, default=0.0, help="of numbers (0: none)")
     parser.add_argument("--all", action="store_true", help="print every difference")
     arguments = parser.parse_args()
     with contextlib.ExitStack() as stack:
@@ -98,11 +108,11 @@ def _compare(work: Path, arguments: argparse.Namespace) -> int:
             list(both.map(lambda run, s=step: _run(s, run[1], work / run[0]), runs))
     _progress("comparing")
     hashes = [_hashes(work / name) for name in VERSIONS]
-    judged = [_judge(step, work, hashes) for step in steps]
+    judged = [_judge(step, work, hashes, arguments.tolerance) for step in steps]
     _progress("")
     if _tree_hash(work / "inputs") != inputs:
         change = Difference("inputs", "changed", detail="a command wrote to its input")
-        judged.append(Judged(Step("inputs", "inputs"), 0, (change,)))
+        judged.append(Judged(Step("inputs", "inputs"), 0, (change,), 0.0))
     _print(judged, SHOWN if not arguments.all else sys.maxsize)
     print(f"\n{len(steps)} commands with each version, {time.monotonic() - begun:.0f} s; in {work}")
     return int(any(j.state == "differ" for j in judged))
@@ -169,7 +179,7 @@ def _hashes(folder: Path) -> dict[str, str]:
     return {hashlib.sha256(p.read_bytes()).hexdigest(): str(p.relative_to(folder)) for p in files}
 
 
-def _judge(step: Step, work: Path, hashes: Sequence[Mapping[str, str]]) -> Judged:
+def _judge(step: Step, work: Path, hashes: Sequence[Mapping[str, str]], tolerance: float) -> Judged:
     folders = [work / name / step.name for name in VERSIONS]
     said = [json.loads((folder / SAID).read_text()) for folder in folders]
     found = list(_said_differences(*said))
@@ -187,7 +197,7 @@ def _judge(step: Step, work: Path, hashes: Sequence[Mapping[str, str]]) -> Judge
             Difference("run", "changed", detail=f"ended by itself: {said[1]['stderr'][-200:]}")
         )
     real = [d for d in found if not _one_file(d, hashes)]
-    return Judged(step, len(names[0]), tuple(_grouped(real)))
+    return Judged(step, len(names[0]), tuple(_grouped(real)), tolerance)
 
 
 def _one_file(difference: Difference, hashes: Sequence[Mapping[str, str]]) -> bool:
@@ -228,19 +238,16 @@ def _grouped(differences: Iterable[Difference]) -> Iterator[Difference]:
 
 
 def _print(judged: Sequence[Judged], most: int) -> None:
-    rows = [("", "commands", "files", "equal", "differ", "mended", "largest", "new keys")]
+    states = ("equal", "near", "differ", "mended")
+    rows = [("", "commands", "files", *states, "largest", "new keys")]
     groups = list(dict.fromkeys(j.step.group for j in judged))
     for group in [*groups, "all"]:
         own = [j for j in judged if group in (j.step.group, "all")]
-        states = [j.state for j in own]
-        sizes = [d.size for j in own if j.state == "differ" for d in j.wrong]
+        found = [j.state for j in own]
+        sizes = [d.size for j in own if j.state != "mended" for d in j.changed]
         known = [size for size in sizes if not math.isnan(size)]
         new = {d.place for j in own for d in j.differences if d.what == "new"}
-        counts = (
-            len(own),
-            sum(j.files for j in own),
-            *map(states.count, ("equal", "differ", "mended")),
-        )
+        counts = (len(own), sum(j.files for j in own), *map(found.count, states))
         largest = f"{max(known):.2g}" if known else "values" if sizes else "-"
         rows.append((group, *map(str, counts), largest, str(len(new))))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

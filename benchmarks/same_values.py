@@ -25,8 +25,8 @@ from pxr import Sdf
 NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?!\w)")
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-# Files name their writer: its version is no result.
-VERSION_KEYS = {"usdhand", "version", "generator"}
+# The version of a file's writer, and how well its numbers could be packed, are no results.
+NO_RESULTS = {"usdhand": str, "version": str, "generator": str, "bytes": int}
 
 
 @dataclass(frozen=True)
@@ -73,10 +73,15 @@ def text_differences(before: str, after: str, place: str = "") -> Iterator[Diffe
         yield Difference(place, "changed", float(np.max(np.abs(np.subtract(a, b)))), "numbers")
         return
     lines, others = before.splitlines(), after.splitlines()
-    gone = [line for line in lines if line not in others] or ["(lines in another order)"]
+    count = f"{len(lines)} -> {len(others)} lines"
+    if sorted(filter(None, lines)) == sorted(filter(None, others)):
+        order = "the same lines in another order" if len(lines) == len(others) else "empty ones"
+        yield Difference(place, "changed", detail=f"{count}, {order}")
+        return
+    gone = [line for line in lines if line not in others] or ["(nothing)"]
     come = [line for line in others if line not in lines] or ["(nothing)"]
-    count = f"{len(lines)} -> {len(others)} lines, first: "
-    yield Difference(place, "changed", detail=f"{count}{gone[0][:200]!r} -> {come[0][:200]!r}")
+    shown = f"{gone[0][:200]!r} -> {come[0][:200]!r}"
+    yield Difference(place, "changed", detail=f"{count}, first: {shown}")
 
 
 def tree_differences(before: Any, after: Any, place: str = "") -> Iterator[Difference]:
@@ -84,7 +89,8 @@ def tree_differences(before: Any, after: Any, place: str = "") -> Iterator[Diffe
     if isinstance(before, Mapping) and isinstance(after, Mapping):
         for key in [*before, *(k for k in after if k not in before)]:
             inner = f"{place}.{key}" if place else str(key)
-            if key in VERSION_KEYS and all(isinstance(x.get(key), str) for x in (before, after)):
+            kind = NO_RESULTS.get(key)
+            if kind and all(isinstance(tree.get(key), kind) for tree in (before, after)):
                 continue
             if key not in after:
                 yield Difference(inner, "missing", detail=_short(before[key]))
@@ -118,8 +124,14 @@ def value_differences(before: Any, after: Any, place: str) -> Iterator[Differenc
         yield Difference(place, "changed", detail=f"{_short(before)} -> {_short(after)}{shape}")
         return
     both = np.isnan(a) & np.isnan(b) | (a == b)
-    if not both.all():
-        size = float(np.max(np.where(both, 0.0, np.abs(a - b))))
+    if both.all():
+        return
+    size = float(np.max(np.where(both, 0.0, np.abs(a - b))))
+    turned = np.where(np.sum(a * b, axis=-1, keepdims=True) < 0.0, -b, b) if a.ndim else b
+    if "Quat" in type(before).__name__ and np.abs(a - turned).max() < 0.01 * size:
+        rest = np.abs(a - turned).max()
+        yield Difference(place, "changed", size, f"signs of quaternions, else by up to {rest:.2g}")
+    else:
         yield Difference(place, "changed", size, f"{np.sum(~both)} of {a.size} numbers")
 
 
