@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from usdhand.display import displayed
+from usdhand.motion.arrays import ArrayRig, Quaternions, UpAxis, rate_of
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
 from usdhand.motion.timing import time_codes
-from usdhand.motion.transforms import decompose_trs
+from usdhand.motion.transforms import decompose_trs, with_even_signs
 from usdhand.problems import Problem
 
 
@@ -87,6 +90,84 @@ class Clip:
         scales = np.ones_like(translations)
         fps = origin.time_codes_per_second
         return cls(skeleton, rotations, translations, scales, fps, name, origin, problems)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        joints: Sequence[str],
+        rotations: ArrayLike,
+        *,
+        quaternions: Quaternions,
+        fps: float,
+        units: str | float,
+        up: UpAxis = "Y",
+        parents: ArrayLike | None = None,
+        bind: ArrayLike | None = None,
+        rest: ArrayLike | None = None,
+        translations: ArrayLike | None = None,
+        scales: ArrayLike | None = None,
+        name: str = "clip",
+    ) -> Clip:
+        """Make a clip of arrays in memory, such as a body model or a solver gives.
+
+        Joints may come in any order; in the clip, parents come before their children.
+
+        Parameters
+        ----------
+        joints : paths ("Hips/Spine/Head"), or names if ``parents`` are given
+        rotations : (frames, joints, 4) joint-to-parent unit quaternions
+        quaternions : the order of their numbers, "xyzw" (scipy, USD arrays) or "wxyz" (many others)
+        fps : frames a second
+        units : of length: "mm", "cm", "m", "in", "ft", or a number of centimetres
+        up : "Y" or "Z", the axis that is up in the space of the roots
+        parents : (joints,) index of the parent, -1 for a root
+        bind : joint-to-world transforms of the bind pose, (joints, 4, 4) for column vectors, or
+            (joints, 3) where no joint is turned there; made of ``rest`` if None
+        rest : joint-to-parent transforms of the rest pose, likewise; made of ``bind`` if None
+        translations : (frames, joints, 3) joint-to-parent, or (joints, 3) for all frames; those of
+            the rest pose if None
+        scales : likewise
+        name : for messages and reports, and of the character in files
+
+        Raises
+        ------
+        UsageError
+            if shapes, names or parents do not fit each other, or the order of the quaternions is
+            not the one of the arrays.
+        InputError
+            if a value is not finite, a quaternion is not of unit length (within 0.001, which is
+            mended), or a transform has no inverse.
+
+        Examples
+        --------
+        Three joints at rest, and how the last one bends by a quarter of a turn:
+
+        >>> clip = Clip.from_arrays(
+        ...     ["hips", "chest", "head"],
+        ...     [[[1, 0, 0, 0]] * 3, [[1, 0, 0, 0], [1, 0, 0, 0], [0.7071, 0.7071, 0, 0]]],
+        ...     quaternions="wxyz",
+        ...     parents=[-1, 0, 1],
+        ...     bind=[[0, 1.0, 0], [0, 1.4, 0], [0, 1.7, 0]],
+        ...     fps=30,
+        ...     units="m",
+        ... )
+        >>> clip.translations[0].tolist()
+        [[0.0, 100.0, 0.0], [0.0, 40.0, 0.0], [0.0, 30.0, 0.0]]
+        """
+        rig = ArrayRig.of(joints, parents, bind, rest, units, up)
+        turned = rig.rotations(rotations, quaternions)
+        moved = rig.translations(translations, len(turned))
+        turned, scaled = with_even_signs(turned, rig.scales(scales, len(turned)))
+        return cls(
+            rig.skeleton,
+            turned,
+            moved,
+            scaled,
+            rate := rate_of(fps),
+            name,
+            Origin(time_codes_per_second=rate),
+            rig.doubts(),
+        )
 
     def __len__(self) -> int:
         return len(self.rotations)
