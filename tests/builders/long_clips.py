@@ -44,6 +44,17 @@ def still_clip(seconds: float, *, fps: float = 6.0, name: str = "still") -> Clip
     )
 
 
+def followed_by(first: Clip, *others: Clip) -> Clip:
+    """Clips of one skeleton and rate, one after the other."""
+    clips = (first, *others)
+    return replace(
+        first,
+        rotations=np.concatenate([clip.rotations for clip in clips]),
+        translations=np.concatenate([clip.translations for clip in clips]),
+        scales=np.concatenate([clip.scales for clip in clips]),
+    )
+
+
 def _joints(clip: Clip) -> list[int]:
     """Elbows, wrists and fingers, in the order of the skeleton."""
     words = ("ForeArm", "Hand")

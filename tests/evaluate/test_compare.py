@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.clips import frames_of
+from builders.cost import at_most
 from builders.moving_hands import hand_map, moved, random_turns, skeleton
 from builders.rigs import METACARPALS, parents
 from hypothesis import given, settings
@@ -17,6 +18,7 @@ from usdhand.anatomy.channels import Channels, Hands
 from usdhand.anatomy.hand import SIDES, CharacterMap
 from usdhand.errors import UsageError
 from usdhand.evaluate.compare import Comparison, compare_clips, find_lag, rms_jerk
+from usdhand.evaluate.compare import _unique_joints as unique_joints
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import resample
@@ -169,6 +171,16 @@ def test_other_characters_are_compared_by_channels() -> None:
     assert found.rms_deg < 1e-6
     assert found.fingertip_max < 1e-6
     assert found.lag == pytest.approx(0.0, abs=1e-6)
+
+
+def test_joints_are_compared_by_names_that_no_other_has() -> None:
+    """Twenty thousand of them in a pass, not one with every other."""
+    names = [f"j{i}" for i in range(20_000)] + ["double", "double"]
+    still = np.tile(np.eye(4), (len(names), 1, 1))
+    parents = np.full(len(names), -1, dtype=np.intp)
+    skeleton = Skeleton(tuple(names), parents, still, still)
+    with at_most(2.0):
+        assert unique_joints(skeleton) == {f"j{i}": i for i in range(20_000)}
 
 
 def test_hands_with_nothing_in_common_are_refused() -> None:

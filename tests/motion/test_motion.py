@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import stages
+from builders.cost import at_most
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
@@ -121,6 +122,40 @@ def test_order_puts_parents_first(order: list[int]) -> None:
     place = {joint: i for i, joint in enumerate(skeleton.order)}
     assert len(place) == len(skeleton)
     assert all(place[int(p)] < place[j] for j, p in enumerate(skeleton.parents) if p >= 0)
+
+
+def skeleton_of(parents: list[int]) -> Skeleton:
+    still = np.tile(np.eye(4), (len(parents), 1, 1))
+    names = tuple(f"j{i}" for i in range(len(parents)))
+    return Skeleton(names, np.array(parents, dtype=np.intp), still, still)
+
+
+@given(st.data(), st.integers(1, 40))
+def test_what_is_above_and_below(data: st.DataObject, count: int) -> None:
+    """Against the definitions, in any order of joints and with any number of roots."""
+    above = [data.draw(st.integers(-1, i - 1)) for i in range(count)]
+    place = data.draw(st.permutations(range(count)))
+    parents = [0] * count
+    for joint, parent in enumerate(above):
+        parents[place[joint]] = -1 if parent < 0 else place[parent]
+    skeleton = skeleton_of(parents)
+    lines = [skeleton.ancestors(j) for j in range(count)]
+    assert list(skeleton.order) == sorted(range(count), key=lambda j: len(lines[j]))
+    for joint in range(count):
+        below = skeleton.descendants(joint)
+        assert sorted(below) == [j for j in range(count) if joint in lines[j]]
+        assert all(parents[j] == joint or parents[j] in below[:i] for i, j in enumerate(below))
+    some = data.draw(st.lists(st.integers(0, count - 1)))
+    wanted = {*some, *(a for j in some for a in lines[j])}
+    assert skeleton.with_ancestors(some) == tuple(j for j in skeleton.order if j in wanted)
+
+
+def test_a_rope_is_ordered_in_a_pass() -> None:
+    rope = skeleton_of([*range(-1, 19_999)])
+    with at_most(2.0):
+        assert rope.order == tuple(range(20_000))
+        assert rope.descendants(0) == tuple(range(1, 20_000))
+        assert rope.with_ancestors(range(20_000)) == rope.order
 
 
 def test_finding_joints() -> None:

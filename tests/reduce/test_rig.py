@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -65,6 +66,28 @@ def test_circles_are_refused_by_name(circle: tuple[str, ...]) -> None:
     rig = ReducedRig((Relation("a", "free"), *ring))
     with pytest.raises(InputError, match="circle: " + " -> ".join((*circle, circle[0]))):
         rig.evaluate(FREE)
+
+
+def test_chains_of_any_length_are_followed() -> None:
+    """Files are written by others: a chain may be longer than a stack."""
+    names = [f"c{i}" for i in range(5000)]
+    chain = [Relation("c0", "free"), *(linear(b, a) for a, b in pairwise(names))]
+    order = evaluation_order(chain[::-1])
+    assert [r.name for r in order] == names
+    with pytest.raises(InputError, match="circle"):
+        evaluation_order([linear("c0", "c4999"), *chain[1:]])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
+def test_controllers_come_before_their_followers(seed: int, count: int) -> None:
+    random = np.random.default_rng(seed)
+    relations = [
+        linear(f"c{i}", *(f"c{j}" for j in range(i) if random.random() < 0.2)) for i in range(count)
+    ]
+    shuffled = [relations[i] for i in random.permutation(count)]
+    place = {r.name: i for i, r in enumerate(evaluation_order(shuffled))}
+    assert len(place) == count
+    assert all(place[c] < place[r.name] for r in relations for c in r.controllers)
 
 
 def test_a_missing_controller_is_refused_by_name() -> None:

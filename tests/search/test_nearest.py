@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from builders.cost import processor_seconds
 from conftest import shared_data
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -98,6 +99,48 @@ def test_excluded_groups(seed: int, count: int) -> None:
     groups = rng.integers(0, 4, count)
     exclude = np.array([[-1, -1], [0, -1], [2, 3]])
     check(library, motions(seed + 1, 3, 3, 10, 16), 4, groups=groups, exclude=exclude)
+
+
+def test_groups_left_out_of_all_queries() -> None:
+    library, groups = motions(21, 60, 3), [number % 20 for number in range(60)]
+    left = np.arange(0, 20, 3)
+    queries = motions(22, 4, 3)
+    check(library, queries, groups=groups, exclude=np.tile(left, (4, 1)))
+    index, asked = prepare(pack(library, groups=groups)), pack(queries)
+    for prune in (True, False):
+        same(
+            search(index, asked, exclude=left, prune=prune),
+            search(index, asked, exclude=np.tile(left, (4, 1)), prune=prune),
+        )
+    assert (search(index, asked, exclude=[]).ids == search(index, asked).ids).all()
+
+
+def test_leaving_groups_out_is_one_pass() -> None:
+    """Not one over all candidates for each group."""
+    index = prepare(pack(motions(23, 20_000, 3, 20, 30), groups=np.arange(20_000)))
+    queries = pack(motions(24, 60, 3, 22, 28))
+
+    def seconds(groups: int) -> float:
+        begun = processor_seconds()
+        search(index, queries, exclude=np.arange(groups))
+        return processor_seconds() - begun
+
+    seconds(1)
+    assert seconds(4000) < 10 * max(seconds(10), 0.1)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=8)
+def test_queries_that_repeat_have_the_same_answer(seed: int) -> None:
+    """As the cuts of a hold do; other groups left out make another question."""
+    rng = np.random.default_rng(seed)
+    kinds = motions(seed % 1000, 3, 2, 20, 24)
+    chosen = np.repeat(rng.integers(0, 3, 6), rng.integers(1, 4, 6))
+    exclude = np.repeat(rng.integers(-1, 3, 6), rng.integers(1, 4, 6))[: len(chosen)]
+    exclude = np.concatenate([exclude, np.full(len(chosen) - len(exclude), -1)])
+    groups = [number % 3 for number in range(12)]
+    library = motions(seed % 1000 + 1, 12, 2, 20, 24)
+    check(library, [kinds[i] for i in chosen], groups=groups, exclude=exclude[:, None])
 
 
 @pytest.mark.parametrize("width", [1, 4, 5, 12, 40])

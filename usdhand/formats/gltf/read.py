@@ -68,7 +68,7 @@ def animation_names(path: Path) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Scene:
+class _GltfScene:
     """A file, the character chosen in it, and how else it is read."""
 
     reading: Reading
@@ -105,16 +105,16 @@ class _Scene:
         )
 
 
-def _scene(path: Path, reading: Reading) -> _Scene:
+def _scene(path: Path, reading: Reading) -> _GltfScene:
     document = read_document(path)
     tree, humanoid = read_tree(document), read_humanoid(document)
     moving = moved_nodes(document)
     moved: set[int] = set().union(*moving.values())
     character = find_character(document, tree, humanoid, moved, reading.skel)
-    return _Scene(reading, document, tree, humanoid, moving, character)
+    return _GltfScene(reading, document, tree, humanoid, moving, character)
 
 
-def _animated(scene: _Scene) -> Clip:
+def _animated(scene: _GltfScene) -> Clip:
     document, tree, nodes, parents = scene.document, scene.tree, scene.nodes, scene.parents
     names = names_of(document, scene.moving)
     number = choose(document.path, names, scene.reading.animation)
@@ -164,13 +164,13 @@ def _animated(scene: _Scene) -> Clip:
     )
 
 
-def _still(scene: _Scene) -> Clip:
+def _still(scene: _GltfScene) -> Clip:
     skeleton, problems = _skeleton(scene)
     origin = replace(scene.origin, time_codes_per_second=DEFAULT_FPS)
     return Clip.at_bind_pose(skeleton, scene.document.path.stem, origin, problems)
 
 
-def _skeleton(scene: _Scene) -> tuple[Skeleton, tuple[Problem, ...]]:
+def _skeleton(scene: _GltfScene) -> tuple[Skeleton, tuple[Problem, ...]]:
     """Joints with their bind pose, and as rest pose the default transforms of the nodes."""
     tree, nodes, parents = scene.tree, scene.nodes, scene.parents
     space, pose = scene.space, Motion({})
@@ -189,7 +189,7 @@ def _skeleton(scene: _Scene) -> tuple[Skeleton, tuple[Problem, ...]]:
     return Skeleton(_joint_paths(scene), parents, bind, rest, aliases), (*odd, *problems)
 
 
-def _joint_paths(scene: _Scene) -> tuple[str, ...]:
+def _joint_paths(scene: _GltfScene) -> tuple[str, ...]:
     """Full paths of the joints; of siblings with one name the later ones get a number."""
     paths: list[str] = []
     taken: dict[str, int] = {}
