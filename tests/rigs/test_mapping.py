@@ -111,6 +111,16 @@ def test_names_without_a_side(rig: str, side: Side) -> None:
     assert any("side by shape" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("missing", FINGERS)
+@pytest.mark.parametrize("rig", UNSIDED)
+def test_names_without_a_side_and_a_finger_fewer(rig: str, missing: str) -> None:
+    named: dict[Joint, str] = {
+        ("right", role): n for (_, role), n in RIGS[rig].items() if not role.startswith(missing)
+    }
+    skeleton, expected = build(named)
+    same_joints(map_character(skeleton), expected)
+
+
 @pytest.mark.parametrize("rig", UNSIDED)
 def test_side_from_words_around(rig: str) -> None:
     # The hand is a left one: the word is believed, not the shape.

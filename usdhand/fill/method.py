@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import pairwise
 
@@ -80,7 +80,7 @@ def fill(
         raise InputError(f"{body.name} is a single frame; there is no motion to find fingers for.")
     channels = hands.encode(body)
     arms = {s: at_arm_rate(arm_motion(body, hands, s), body.fps) for s in hands.frames}
-    own = same_motion(library, arms, content_hash)
+    own = frozenset(same_motion(library, arms, content_hash))
     moving = tuple(s for s in moving_sides(channels, hands) if s in sides)
     kept = () if replace_motion else moving
     open_sides: Part = tuple(s for s in sides if s in hands.frames and s not in kept)
@@ -143,7 +143,7 @@ def fill(
         tuple(s for s in open_sides if s not in wanted),
         tuple(sorted(changed)),
         {side: names for side, names in missing.items() if names},
-        tuple(library.clips[i].name for i in own),
+        tuple(library.clips[i].name for i in sorted(own)),
         {s: names for s in wanted if (names := _set_aside(library, joints[s], s, own))},
         tuple(s for part in parts if all(is_still(arms[s]) for s in part) for s in part),
         settings,
@@ -168,7 +168,7 @@ def _hold_typical_pose(curves: Array) -> Array:
 
 
 def _shared_joints(
-    library: MotionLibrary, hands: Hands, side: Side, own: Sequence[int]
+    library: MotionLibrary, hands: Hands, side: Side, own: Set[int]
 ) -> tuple[str, ...]:
     """The body's hand joints to fill: many, of many segments that are not its own.
 
@@ -194,7 +194,7 @@ def _shared_joints(
 
 
 def _set_aside(
-    library: MotionLibrary, joints: tuple[str, ...], side: Side, own: Sequence[int]
+    library: MotionLibrary, joints: tuple[str, ...], side: Side, own: Set[int]
 ) -> tuple[str, ...]:
     """Names of clips of a hand that are not used since they lack some of its joints."""
     return tuple(
@@ -208,7 +208,7 @@ def _usable_clips(
     library: MotionLibrary,
     joints: Mapping[Side, tuple[str, ...]],
     part: Part,
-    own: Sequence[int],
+    own: Set[int],
 ) -> frozenset[int]:
     """Library clips with segments and these hand joints that are not the body's own."""
     return frozenset(
@@ -224,13 +224,11 @@ def _usable_clips(
     )
 
 
-def _why_none(
-    library: MotionLibrary, body: Clip, hands: Hands, sides: Part, own: Sequence[int]
-) -> str:
+def _why_none(library: MotionLibrary, body: Clip, hands: Hands, sides: Part, own: Set[int]) -> str:
     if not library.clips:
         return "The library is empty; build it from clips with body and fingers."
-    if any(_shared_joints(library, hands, side, ()) for side in sides):
-        names = ", ".join(library.clips[i].name for i in own)
+    if any(_shared_joints(library, hands, side, frozenset()) for side in sides):
+        names = ", ".join(library.clips[i].name for i in sorted(own))
         return f"The library has nothing but {body.name} itself ({names}); add other motion."
     joints = "; ".join(f"{side}: {', '.join(hands.frames[side].names)}" for side in sides)
     return f"No clip of the library has any hand joint of {body.name} ({joints})."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from usdhand.anatomy.hand import HandMap, Side
+from usdhand.anatomy.hand import FINGERS, HandMap, Side
 from usdhand.errors import HandNotFoundError
 from usdhand.rigs.choose_joints import choose_hand, refuse_ambiguous
 from usdhand.rigs.convention_match import ConventionMatch
@@ -26,7 +26,8 @@ def unsided_hands(
             hand = choose_hand(rig, "left", near, notes)
             if hand is None or any(hand.wrist == h.wrist for h in hands.values()):
                 continue
-            side = named_side(rig.path(hand.joints["IndexMCP"])) or named_side(rig.path(wrist))
+            knuckles = [hand.joints[f + "MCP"] for f in FINGERS if f + "MCP" in hand.joints]
+            side = named_side(rig.path((*knuckles, wrist)[0])) or named_side(rig.path(wrist))
             how = "names"
             if side is None:
                 side, how = chirality(rig.points, wrist, hand.joints), "shape"
