@@ -79,11 +79,13 @@ def _refuse_twins(
     for other in matches:
         if other is match or other.convention is not match.convention:
             continue
-        # The first six places say how complete a match is and whose prefix it has; a plain set
+        # The first seven places say how complete a match is and whose prefix it has; a plain set
         # wins over prefixed copies of it (FK and IK copies of the deforming joints).
-        if other.rank[:6] == match.rank[:6] and match.prefix + match.suffix:
-            side = next(iter(match.hands))
-            role = next(r for r in HAND_JOINTS if r in match.hands[side])
+        if other.rank[:7] != match.rank[:7] or not match.prefix + match.suffix:
+            continue
+        side = next(iter(match.hands))
+        role = next(r for r in HAND_JOINTS if r in match.hands[side])
+        if role in other.hands.get(side, {}) and other.hands[side] != match.hands[side]:
             paths = [rig.path(m.hands[side][role][0]) for m in (match, other)]
             raise HandNotFoundError(
                 f"two sets of joints are named as hands ({match.convention.name}), e.g. "

@@ -12,6 +12,9 @@ from usdhand.anatomy.hand import FINGERS, HAND_JOINTS, Side
 from usdhand.rigs.conventions import Convention
 from usdhand.rigs.joint_names import Candidates, NamedJoints
 
+# Side -> key -> joints.
+Lookup = Mapping[Side | None, Mapping[str, tuple[int, ...]]]
+
 
 @dataclass(frozen=True)
 class ConventionMatch:
@@ -34,24 +37,50 @@ def exact_roles(rig: NamedJoints, names: Mapping[str, Sequence[str]]) -> Candida
 
 
 def convention_matches(rig: NamedJoints, convention: Convention) -> Iterator[ConventionMatch]:
-    """Ways to lay a convention over a rig that give a hand, by what stands around its names."""
-    for prefix, suffix in _affixes(rig, convention):
+    """Ways to lay a convention over a rig that give a hand, by what stands around its names.
 
-        def joints(names: Sequence[str], pre: str = prefix, post: str = suffix) -> tuple[int, ...]:
-            return next((f for n in names if (f := rig.by_key.get(pre + n + post))), ())
+    Names are compared as they are, and without the word for their side, which rigs put anywhere:
+    ``HandLeft`` for ``LeftHand``.
+    """
+    as_they_are: Lookup = dict.fromkeys(convention.hand_keys, rig.by_key)
+    yield from _matches(rig, convention, convention.hand_keys, as_they_are, moved=False)
+    sideless = convention.sideless_keys
+    yield from _matches(rig, convention, sideless, rig.by_sideless_key, moved=True)
+
+
+def _matches(
+    rig: NamedJoints,
+    convention: Convention,
+    names_of: Mapping[Side | None, Mapping[str, Sequence[str]]],
+    lookup: Lookup,
+    *,
+    moved: bool,
+) -> Iterator[ConventionMatch]:
+    for prefix, suffix in _affixes(lookup, names_of):
+
+        def joints(
+            keys: Mapping[str, tuple[int, ...]],
+            names: Sequence[str],
+            pre: str = prefix,
+            post: str = suffix,
+        ) -> tuple[int, ...]:
+            return next((f for n in names if (f := keys.get(pre + n + post))), ())
 
         hands: dict[Side | None, Candidates] = {}
-        for side, roles in convention.hand_keys.items():
-            found = {role: js for role, names in roles.items() if (js := joints(names))}
+        for side, roles in names_of.items():
+            found = {
+                role: js for role, names in roles.items() if (js := joints(lookup[side], names))
+            }
             if is_hand(found):
                 hands[side] = found
         if not hands:
             continue
-        body = {role: js for role, names in convention.body_keys.items() if (js := joints(names))}
+        keys = rig.by_key
+        body = {r: js for r, names in convention.body_keys.items() if (js := joints(keys, names))}
         # The arms may hang from any spine joint: keep them all, the hierarchy decides.
-        chests = [joints([n]) for n in convention.body_keys.get("chest", ())]
+        chests = [joints(keys, [n]) for n in convention.body_keys.get("chest", ())]
         body["chest"] = tuple(j for js in chests for j in js)
-        rank = _rank(rig, convention, prefix, suffix, hands, body)
+        rank = _rank(rig, convention, prefix, suffix, hands, body, moved)
         yield ConventionMatch(convention, prefix, suffix, hands, body, rank)
 
 
@@ -60,15 +89,18 @@ def is_hand(roles: Mapping[str, object]) -> bool:
     return sum(f + "MCP" in roles and f + "PIP" in roles for f in FINGERS) >= 2
 
 
-def _affixes(rig: NamedJoints, convention: Convention) -> list[tuple[str, str]]:
+def _affixes(
+    lookup: Lookup, names_of: Mapping[Side | None, Mapping[str, Sequence[str]]]
+) -> list[tuple[str, str]]:
     """Most frequent (prefix, suffix) around the names of finger joints; the plain one first."""
-    text = "\n".join(rig.by_key)
     found: Counter[tuple[str, str]] = Counter()
-    for roles in convention.hand_keys.values():
+    for side, roles in names_of.items():
+        keys = lookup[side]
+        text = "\n".join(keys)
         for anchor in (n for f in FINGERS for j in ("MCP", "PIP") for n in roles.get(f + j, ())):
             if anchor not in text:
                 continue
-            for key in rig.by_key:
+            for key in keys:
                 if (start := key.rfind(anchor)) >= 0:
                     found[key[:start], key[start + len(anchor) :]] += 1
     return sorted(found, key=lambda a: (-found[a], len(a[0]) + len(a[1]), a))[:8]
@@ -81,6 +113,7 @@ def _rank(
     suffix: str,
     hands: Mapping[Side | None, Candidates],
     body: Candidates,
+    moved: bool,
 ) -> tuple[int, ...]:
     """How well a match fits; the larger the better, the first difference decides."""
     required = sum(r in roles for roles in hands.values() for r in ("wrist", *HAND_JOINTS))
@@ -102,6 +135,7 @@ def _rank(
     return (
         len(hands),
         convention.own,
+        -moved,
         required,
         matched,
         in_line,

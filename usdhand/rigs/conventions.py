@@ -89,6 +89,15 @@ class Convention:
         return {side: _keys(roles) for side, roles in self.hands.items()}
 
     @cached_property
+    def sideless_keys(self) -> Mapping[Side | None, Mapping[str, Names]]:
+        """``hand_keys`` without the words for the side; empty where names have none."""
+        return {
+            side: {role: tuple(without_side(n)[1] for n in names) for role, names in roles.items()}
+            for side, roles in self.hands.items()
+            if side is not None
+        }
+
+    @cached_property
     def body_keys(self) -> Mapping[str, Names]:
         """``body`` with the names' spelling-free forms."""
         return _keys(self.body)
@@ -282,10 +291,12 @@ def _keys(roles: Mapping[str, Names]) -> dict[str, Names]:
 
 
 _SIDE_WORDS: dict[str, Side] = {
-    **dict.fromkeys(("left", "lft", "lf", "l"), "left"),
-    **dict.fromkeys(("right", "rgt", "rt", "r"), "right"),
+    **dict.fromkeys(("left", "lft", "lf", "lt", "l", "links", "linke", "linker"), "left"),
+    **dict.fromkeys(("gauche", "izquierda", "izquierdo", "sinistra", "sinistro", "左"), "left"),
+    **dict.fromkeys(("right", "rgt", "rt", "rg", "r", "rechts", "rechte", "rechter"), "right"),
+    **dict.fromkeys(("droite", "droit", "derecha", "derecho", "destra", "destro", "右"), "right"),
 }
-_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+_WORD = re.compile(r"[左右]|[A-Z]?[a-zà-ÿ]+|[A-Z]+(?![a-z])")
 
 
 def named_side(joint: str) -> Side | None:
@@ -298,3 +309,13 @@ def named_side(joint: str) -> Side | None:
         if sides:
             return sides.pop() if len(sides) == 1 else None
     return None
+
+
+def without_side(name: str) -> tuple[Side | None, str]:
+    """Split a name into the side it speaks of and the key of what is left without that word."""
+    words = [(m.span(), _SIDE_WORDS.get(m.group().lower())) for m in _WORD.finditer(name)]
+    sided = [(span, side) for span, side in words if side is not None]
+    if len(sided) != 1:
+        return None, name_key(name)
+    (start, end), side = sided[0]
+    return side, name_key(name[:start] + name[end:])

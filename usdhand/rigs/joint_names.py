@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from usdhand.anatomy.hand import SIDES, Side
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
 from usdhand.rigs.body import joint_points
-from usdhand.rigs.conventions import name_key
+from usdhand.rigs.conventions import name_key, without_side
 
 # Role ("wrist", "IndexMCP") -> the joints that bear one of its names.
 Candidates = Mapping[str, tuple[int, ...]]
@@ -52,6 +53,19 @@ class NamedJoints:
             if key:
                 found.setdefault(key, []).append(joint)
         return {key: tuple(joints) for key, joints in found.items()}
+
+    @cached_property
+    def by_sideless_key(self) -> dict[Side | None, dict[str, tuple[int, ...]]]:
+        """Side -> key without the word for the side -> joints, in the file's order."""
+        found: dict[Side | None, dict[str, list[int]]] = {side: {} for side in SIDES}
+        for joint, name in enumerate(self.names):
+            side, key = without_side(name)
+            if side is not None and key:
+                found[side].setdefault(key, []).append(joint)
+        return {
+            side: {key: tuple(joints) for key, joints in keys.items()}
+            for side, keys in found.items()
+        }
 
     @cached_property
     def above(self) -> tuple[frozenset[int], ...]:

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
-from usdhand.anatomy.hand import ARM_JOINTS, DIGITS, SIDES, CharacterMap
+from usdhand.anatomy.hand import ARM_JOINTS, BODY_JOINTS, DIGITS, SIDES, CharacterMap
 from usdhand.errors import HandNotFoundError
 from usdhand.motion.skeleton import Skeleton
-from usdhand.rigs.body import arm_joints, body_of
 from usdhand.rigs.by_map_file import with_explicit
 from usdhand.rigs.by_names import match_names, named_body
 from usdhand.rigs.by_shape import FoundHand, find_hands, hand_size
 from usdhand.rigs.convention_match import is_hand
 from usdhand.rigs.conventions import Conventions, load_conventions
 from usdhand.rigs.joint_names import ADVICE, NamedJoints
+from usdhand.rigs.judge import judged_arms, judged_digits
 from usdhand.rigs.sides import sides_of
 
 
@@ -46,7 +45,10 @@ def map_character(skeleton: Skeleton, conventions: Conventions | None = None) ->
             raise
         found = CharacterMap({}, "map file", notes=(f"beyond the map file: {error}",))
     found = with_explicit(rig, found, by_hand) if by_hand else found
-    return _with_arms_and_body(rig, found)
+    fixed: dict[str, set[str]] = {side: set(by_hand.get(side, ())) for side in (*SIDES, "body")}
+    if any(skeleton.aliases):
+        fixed = {where: {*ARM_JOINTS, *BODY_JOINTS} for where in fixed}
+    return judged_arms(rig, found, fixed)
 
 
 def _found(rig: NamedJoints, conventions: Conventions) -> CharacterMap:
@@ -55,7 +57,7 @@ def _found(rig: NamedJoints, conventions: Conventions) -> CharacterMap:
     if aliased and (found := match_names(aliased, conventions)):
         return _with_unnamed_digits(rig, found)
     if found := match_names(rig, conventions):
-        found = _with_unnamed_digits(rig, found)
+        found = judged_digits(rig, _with_unnamed_digits(rig, found))
     else:
         found = _hands_by_shape(rig, conventions)
     return named_body(aliased, found, conventions) if aliased else found
@@ -135,24 +137,3 @@ def _nearest_names(rig: NamedJoints) -> str:
     words = ("thumb", "index", "finger", "pinky")
     seen = [n for n, k in zip(rig.names, rig.keys, strict=True) if any(w in k for w in words)]
     return f" with two fingers of two joints (seen: {', '.join(seen[:4])})" if seen else ""
-
-
-def _with_arms_and_body(rig: NamedJoints, found: CharacterMap) -> CharacterMap:
-    """Fill in arm and body joints that names did not give, by hierarchy."""
-    wrists = [h.wrist for h in found.hands.values()]
-    body = body_of(rig.skeleton, rig.points, wrists).joints
-    missing: dict[str, Any] = {r: j for r, j in body.items() if getattr(found, r) is None}
-    found = replace(found, **missing)
-    notes = [f"{r} by hierarchy: {rig.path(j)}" for r, j in missing.items()]
-    hands = {}
-    for side, hand in found.hands.items():
-        on_neck = found.neck in rig.skeleton.ancestors(hand.wrist)
-        trunk = found.neck if on_neck else found.chest
-        arm = arm_joints(rig.skeleton, rig.points, hand.wrist, trunk)
-        used = {getattr(hand, r) for r in ARM_JOINTS}
-        new: dict[str, Any] = {
-            r: j for r, j in arm.items() if getattr(hand, r) is None and j not in used
-        }
-        hands[side] = replace(hand, **new)
-        notes += [f"{side} {r} by hierarchy: {rig.path(j)}" for r, j in new.items()]
-    return replace(found, hands=hands, notes=(*found.notes, *notes))
