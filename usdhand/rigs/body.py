@@ -122,8 +122,7 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
         up = unit(tops - np.mean([points[leg[-1]] for leg in legs], axis=0))
         facing = _toe_direction(points, legs, up)
     arms = {a for w in wrists for a in (w, *skeleton.ancestors(w))}
-    shoulders = [points[c] for c in skeleton.children[chest] if c in arms]
-    if float((np.mean(shoulders, axis=0) - points[chest]) @ up) < 0 and len(spine) > 2:
+    if _below(skeleton, points, wrists, chest, up) and len(spine) > 2:
         # The arms hang down from the neck, as in 3ds Max Biped.
         joints |= {"neck": chest, "chest": spine[1]}
     above = [c for c in skeleton.children[chest] if c not in arms and heights[c] > 0]
@@ -136,6 +135,25 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
         if skeleton.children[neck]:
             joints["head"] = max(skeleton.children[neck], key=lambda c: (heights[c], -c))
     return Body(joints, up, facing)
+
+
+def _below(skeleton: Skeleton, points: Array, wrists: Sequence[int], joint: int, up: Array) -> bool:
+    """Whether clavicles and shoulders lie below a joint: a neck does, a chest lies lower.
+
+    Clavicles alone may start below the chest.
+    """
+    tops = [
+        points[c]
+        for c in skeleton.children[joint]
+        if any(c == w or c in skeleton.ancestors(w) for w in wrists)
+    ]
+    arms = [arm_joints(skeleton, points, wrist, joint) for wrist in wrists]
+    shoulders = [points[arm["shoulder"]] for arm in arms if "shoulder" in arm]
+    return all(
+        float((np.mean(places, axis=0) - points[joint]) @ up) < 0
+        for places in (tops, shoulders)
+        if places
+    )
 
 
 def _legs(
