@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from usdhand.motion.rotations import Array
 FOOT = re.compile(r"foot|ankle|toe", re.IGNORECASE)
 HEAD = re.compile(r"head", re.IGNORECASE)
 _LEG = re.compile(r"foot|ankle|toe|leg|knee|thigh|shin|calf", re.IGNORECASE)
+_BEYOND_A_HAND = re.compile(
+    r"hips|pelvis|spine|chest|torso|neck|head|clavicle|shoulder|elbow|arm", re.IGNORECASE
+)
 
 # The longest way from the root to an end of a human body, along its bones (hips to fingertips), and
 # what passes for one in a file that has no more to say. A part of a body may be far smaller.
@@ -21,31 +24,33 @@ USUAL_REACH_CM = 150.0
 BODY_REACH_CM = (80.0, 400.0)
 PART_REACH_CM = (5.0, 400.0)
 METRIC = {"centimetres": 1.0, "metres": 100.0, "millimetres": 0.1}
-OTHERS = {"decimetres": 10.0, "inches": 2.54, "units of the CMU library": 2.54 / 0.45}
+OTHERS = {"decimetres": 10.0, "inches": 2.54}
+# Files of the CMU motion library measure in inches / 0.45; their joints have these names.
+CMU, CMU_CM = "units of the CMU library", 2.54 / 0.45
+CMU_JOINTS = {"lhipjoint", "rhipjoint", "lowerback"}
+# From the wrist to the tip of a finger.
+USUAL_HAND_CM, HAND_REACH_CM = 18.0, (11.0, 27.0)
 
 # How much longer a body must be along Z than along Y to stand on Z.
 CLEARLY_LONGER = 1.25
 
 
 def guess_units(
-    offsets: Array, parents: NDArray[np.intp], names: Iterable[str]
+    offsets: Array, parents: NDArray[np.intp], names: Sequence[str]
 ) -> tuple[float, Problem]:
-    """Centimetres of one unit of length, by the length of the bones.
+    """Centimetres of one unit of length, by names that tell it, else by the length of the bones.
 
     Parameters
     ----------
     offsets : (joints, 3) joint-to-parent translations
     parents : (joints,) parents before their children, -1 for roots; roots' offsets do not count
+
+    Returns
+    -------
+    The guess, and a note; a warning where another unit would do as well.
     """
     reach = max(float(bone_ways(offsets, parents).max()), 1e-9)
-    body = any(map(_LEG.search, names))
-    least, most = BODY_REACH_CM if body else PART_REACH_CM
-    fitting = {name: cm for name, cm in METRIC.items() if least <= reach * cm <= most}
-    if not fitting and body:
-        near = sorted(
-            OTHERS.items(), key=lambda item: abs(np.log(reach * item[1] / USUAL_REACH_CM))
-        )
-        fitting = {name: cm for name, cm in near if least <= reach * cm <= most}
+    told, fitting = _fitting_units(reach, parents, names)
     if not fitting:
         message = (
             f"the file does not say its unit, and bones reaching {reach:.4g} from the root fit "
@@ -57,7 +62,49 @@ def guess_units(
         f"the file does not say its unit: read as {name}, in which the bones reach "
         f"{reach * cm:.0f} cm from the root; --units says otherwise"
     )
-    return cm, Problem("guessed-units", message, severity="note")
+    sure = told or name in METRIC
+    return cm, Problem("guessed-units", message, severity="note" if sure else "warning")
+
+
+def _fitting_units(
+    reach: float, parents: NDArray[np.intp], names: Sequence[str]
+) -> tuple[bool, dict[str, float]]:
+    """Whether names tell the unit, and the units that fit a skeleton, the likeliest first."""
+    if {name.lower() for name in names} >= CMU_JOINTS and _within(BODY_REACH_CM, reach * CMU_CM):
+        return True, {CMU: CMU_CM}
+    body = any(map(_LEG.search, names))
+    if not body and _is_hand_alone(parents, names):
+        return False, _nearest(reach, USUAL_HAND_CM, HAND_REACH_CM, METRIC | OTHERS)
+    least_to_most = BODY_REACH_CM if body else PART_REACH_CM
+    metric = {n: cm for n, cm in METRIC.items() if _within(least_to_most, reach * cm)}
+    if metric or not body:
+        return False, metric
+    return False, _nearest(reach, USUAL_REACH_CM, BODY_REACH_CM, OTHERS | {CMU: CMU_CM})
+
+
+def _nearest(
+    reach: float, usual: float, limits: tuple[float, float], units: Mapping[str, float]
+) -> dict[str, float]:
+    """Units in which a reach is within limits, that in which it is most usual first."""
+    near = sorted(units.items(), key=lambda item: abs(np.log(reach * item[1] / usual)))
+    return {name: cm for name, cm in near if _within(limits, reach * cm)}
+
+
+def _within(limits: tuple[float, float], value: float) -> bool:
+    return limits[0] <= value <= limits[1]
+
+
+def _is_hand_alone(parents: NDArray[np.intp], names: Sequence[str]) -> bool:
+    """Whether a skeleton is one hand from the wrist, or several: short chains, no trunk, no arm."""
+    if any(map(_BEYOND_A_HAND.search, names)):
+        return False
+    depth, leaves = np.zeros(len(parents), int), set(range(len(parents)))
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            depth[joint] = depth[parent] + 1
+            leaves.discard(int(parent))
+    roots = int((parents < 0).sum())
+    return 3 <= depth.max(initial=0) <= 6 and 3 * roots <= len(leaves) <= 6 * roots
 
 
 def guess_up(poses: Iterable[Array], names: Iterable[str]) -> tuple[str, Problem]:
