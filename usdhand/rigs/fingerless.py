@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,11 +12,12 @@ from usdhand.anatomy.hand import ARM_JOINTS, BODY_JOINTS, HAND_JOINTS, HandMap
 from usdhand.motion.skeleton import Skeleton, leaf_name
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.rigs.body import arm_joints, body_of
+from usdhand.rigs.convention_match import Lookup
 from usdhand.rigs.conventions import Convention, name_key
 from usdhand.rigs.joint_names import NamedJoints
 
-# A wrist with more joints below it, thumb aside, has fingers, whatever they are called. A mitten
-# has up to three: a hand, all fingers in one, an end.
+# A wrist with more joints below it, thumb aside, has fingers, whatever they are called, unless they
+# are one chain. A mitten has up to three: a hand, all fingers in one, an end.
 MOST_WITHOUT_FINGERS = 3
 
 
@@ -40,7 +42,7 @@ class _ArmMatch:
     convention: Convention
     arms: Mapping[Side, Mapping[str, int]]
     body: Mapping[str, int]
-    rank: tuple[int, int, int]
+    rank: tuple[int, ...]
 
 
 def fingerless_arms(
@@ -65,12 +67,14 @@ def fingerless_arms(
     if not arms:
         return None
     wrists = [arm["wrist"] for arm in arms.values()]
-    body: dict[str, Any] = dict(body_of(skeleton, rig.points, wrists).joints)
-    body |= found.body if found else {}
+    body: dict[str, Any] = dict(found.body) if found else {}
+    body |= body_of(skeleton, rig.points, wrists).joints
     hands: dict[Side, HandMap] = {}
     for side, arm in arms.items():
         by_hierarchy = arm_joints(skeleton, rig.points, arm["wrist"], body.get("chest"))
-        whole: dict[str, Any] = by_hierarchy | arm
+        by_user = conventions.explicit.get(side, {})
+        fixed = {role: joint for role, joint in arm.items() if role in by_user}
+        whole: dict[str, Any] = arm | by_hierarchy | fixed
         hands[side] = HandMap(side, joints={}, **whole)
     named_by_file = any("wrist" in conventions.explicit.get(side, {}) for side in arms)
     convention = None if named_by_file or found is None else found.convention
@@ -100,7 +104,9 @@ def finger_names(
         affixes = ("", "")
         if convention is arms.convention:
             affixes = _affixes(leaf_name(skeleton.joints[wrist]), names.get("wrist", ()))
-        found = {r: affixes[0] + names[r][0] + affixes[1] for r in roles if r in names}
+        spelled = {r: affixes[0] + names[r][0] + affixes[1] for r in roles if r in names}
+        # USD takes letters, digits and underscores only.
+        found = {role: re.sub(r"[^0-9A-Za-z_]", "_", name) for role, name in spelled.items()}
         keys = {name_key(name) for name in found.values()}
         whole = all(role in found for role in needed) and len(keys) == len(found)
         if whole and not keys & taken:
@@ -111,42 +117,61 @@ def finger_names(
 
 
 def _is_fingerless(rig: NamedJoints, wrist: int) -> bool:
-    below = rig.skeleton.descendants(wrist)
-    return sum("thumb" not in rig.path(j).lower() for j in below) <= MOST_WITHOUT_FINGERS
+    below = [j for j in rig.skeleton.descendants(wrist) if "thumb" not in rig.path(j).lower()]
+    ends = [j for j in below if not rig.skeleton.children[j]]
+    return len(ends) <= 1 or len(below) <= MOST_WITHOUT_FINGERS
 
 
 def _matches(rig: NamedJoints, conventions: Sequence[Convention]) -> Iterator[_ArmMatch]:
     for number, convention in enumerate(conventions):
         keys = convention.hand_keys
-        wrists = {n for side in SIDES for n in keys.get(side, {}).get("wrist", ())}
-        affixes = {
-            (key[:start], key[start + len(name) :])
-            for key in rig.by_key
-            for name in wrists
-            if (start := key.rfind(name)) >= 0
-        }
-        for prefix, suffix in affixes:
+        as_they_are: Lookup = dict.fromkeys(SIDES, rig.by_key)
+        yield from _arm_matches(rig, convention, keys, as_they_are, (0, -number))
+        sideless = convention.sideless_keys
+        yield from _arm_matches(rig, convention, sideless, rig.by_sideless_key, (-1, -number))
 
-            def joint(
-                names: Sequence[str], pre: str = prefix, post: str = suffix
-            ) -> tuple[int, ...]:
-                """The one joint with the first of these names that a joint has."""
-                found = (rig.by_key[k] for n in names if (k := pre + n + post) in rig.by_key)
-                return next((joints for joints in found if len(joints) == 1), ())
 
-            arms: dict[Side, dict[str, int]] = {}
-            for side in SIDES:
-                roles = keys.get(side, {})
-                own = {r: j[0] for r in ARM_JOINTS if (j := joint(roles.get(r, ())))}
-                if "wrist" in own:
-                    above = rig.above[own["wrist"]]
-                    arms[side] = {r: j for r, j in own.items() if r == "wrist" or j in above}
-            if not arms:
-                continue
-            body = {r: j[0] for r in BODY_JOINTS if (j := joint(convention.body_keys.get(r, ())))}
-            matched = sum(map(len, arms.values())) + len(body)
-            rank = (matched, -len(prefix) - len(suffix), -number)
-            yield _ArmMatch(convention, arms, body, rank)
+def _arm_matches(
+    rig: NamedJoints,
+    convention: Convention,
+    names_of: Mapping[Side | None, Mapping[str, Sequence[str]]],
+    lookup: Lookup,
+    last: tuple[int, int],
+) -> Iterator[_ArmMatch]:
+    """A convention's arms by names as they are, or without the words for their side."""
+    affixes = {
+        (key[:start], key[start + len(name) :])
+        for side in SIDES
+        for name in names_of.get(side, {}).get("wrist", ())
+        for key in lookup[side]
+        if (start := key.rfind(name)) >= 0
+    }
+    for prefix, suffix in affixes:
+
+        def joint(
+            keys: Mapping[str, tuple[int, ...]],
+            names: Sequence[str],
+            pre: str = prefix,
+            post: str = suffix,
+        ) -> tuple[int, ...]:
+            """The one joint with the first of these names that a joint has."""
+            found = (keys[k] for n in names if (k := pre + n + post) in keys)
+            return next((joints for joints in found if len(joints) == 1), ())
+
+        arms: dict[Side, dict[str, int]] = {}
+        for side in SIDES:
+            roles = names_of.get(side, {})
+            own = {r: j[0] for r in ARM_JOINTS if (j := joint(lookup[side], roles.get(r, ())))}
+            if "wrist" in own:
+                above = rig.above[own["wrist"]]
+                arms[side] = {r: j for r, j in own.items() if r == "wrist" or j in above}
+        if not arms:
+            continue
+        names = convention.body_keys
+        body = {r: j[0] for r in BODY_JOINTS if (j := joint(rig.by_key, names.get(r, ())))}
+        matched = sum(map(len, arms.values())) + len(body)
+        rank = (len(arms), matched, -len(prefix) - len(suffix), *last)
+        yield _ArmMatch(convention, arms, body, rank)
 
 
 def _affixes(leaf: str, wrists: Sequence[str]) -> tuple[str, str]:

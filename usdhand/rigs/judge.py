@@ -46,6 +46,8 @@ def _judged_hand(
         roles = [digit + joint for joint in digit_joints(digit)]
         named = {role: joints[role] for role in roles if role in joints}
         formed = {role: shape.joints[role] for role in roles if role in shape.joints}
+        if named == formed and digit in shape.metacarpals:
+            metacarpals.setdefault(digit, shape.metacarpals[digit])
         if named == formed or not set(named.values()) & set(formed.values()):
             continue
         for role in roles:

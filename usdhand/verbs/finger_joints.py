@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,8 @@ from usdhand.rigs.height import body_height
 from usdhand.verbs.clips import find_hands
 from usdhand.verbs.outcome import Journal
 
+_FINGER = re.compile(r"thumb|index|middle|ring|pinky|little", re.IGNORECASE)
+
 # Characters of a library that are tried, most fitting first, before it is said that none is there.
 TRIED = 8
 
@@ -43,18 +46,18 @@ def lacks_fingers(
     return [side for side in sides if arms is not None and side in arms.character.hands]
 
 
-def thumb_stubs(
+def finger_stubs(
     clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
 ) -> dict[Side, list[str]]:
-    """Names of thumb joints that a body without fingers has; what is added stands beside them."""
+    """Names of finger joints that a body without whole fingers has; new ones stand beside them."""
     arms, skeleton = fingerless_arms(clip.skeleton, conventions), clip.skeleton
     found: dict[Side, list[str]] = {}
     for side in sides:
         hand = arms.character.hands.get(side) if arms else None
         below = sorted(skeleton.descendants(hand.wrist)) if hand else []
-        thumbs = [name for joint in below if "thumb" in (name := skeleton.names[joint]).lower()]
-        if thumbs:
-            found[side] = thumbs
+        stubs = [name for joint in below if _FINGER.search(name := skeleton.names[joint])]
+        if stubs:
+            found[side] = stubs
     return found
 
 
@@ -152,7 +155,8 @@ def add_fingers(
     else:
         folder = request.library.absolute().parent
         added = fingers_from_library(clip, library, folder, conventions, bare)
-    for hand, stubs in thumb_stubs(clip, conventions, bare).items():
-        message = f"{hand} hand: {listed(stubs)} stays as it is beside the added thumb"
-        journal.warn("thumb-stub", message)
+    for hand, stubs in finger_stubs(clip, conventions, bare).items():
+        what = "thumb" if all("thumb" in name.lower() for name in stubs) else "fingers"
+        message = f"{hand} hand: {listed(stubs)} stays as it is beside the added {what}"
+        journal.warn("finger-stub", message)
     return added
