@@ -6,9 +6,13 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from builders.shared_work import SharedWork, Shell
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("USDHAND_SHARED", REPOSITORY.parent / "shared"))
@@ -26,6 +30,30 @@ def _every_report_fits_its_schema() -> Iterator[None]:
 
     with judged():
         yield
+
+
+@pytest.fixture(scope="session")
+def shared_work(tmp_path_factory: pytest.TempPathFactory) -> SharedWork:
+    """Work that all workers share."""
+    from builders.shared_work import SharedWork
+
+    own = tmp_path_factory.getbasetemp()
+    return SharedWork((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "shared")
+
+
+@pytest.fixture(scope="session")
+def shell(shared_work: SharedWork) -> Shell:
+    """Where pages' commands are run: each once a session on the same files."""
+    from builders.shared_work import Shell
+
+    return Shell(shared_work, {})
+
+
+@pytest.fixture(scope="session")
+def gestures_library(shell: Shell) -> Path:
+    """A library of all samples of gestures, for reading only."""
+    line = "usdhand library build samples/gestures -o gestures.usdc"
+    return shell.after(line).made["gestures.usdc"] / "gestures.usdc"
 
 
 def shared_data(*parts: str) -> Path:

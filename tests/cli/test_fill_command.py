@@ -38,15 +38,8 @@ FULL = SAMPLES / "conversations" / "talk_01_full.usdc"
 
 
 @pytest.fixture(scope="session")
-def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("library") / "gestures.usdc"
-    run("library", "build", SAMPLES / "gestures", "-o", path)
-    return path
-
-
-@pytest.fixture(scope="session")
-def library(library_file: Path) -> MotionLibrary:
-    return read_library(library_file)
+def library(gestures_library: Path) -> MotionLibrary:
+    return read_library(gestures_library)
 
 
 @pytest.fixture(scope="session")
@@ -78,9 +71,9 @@ def skel_rotations(path: Path, variant: str | None = None) -> Array:
     return np.array([np.array(query.ComputeJointLocalTransforms(t)) for t in range(60, 300, 20)])
 
 
-def test_body_is_untouched_and_report_is_whole(library_file: Path, tmp_path: Path) -> None:
+def test_body_is_untouched_and_report_is_whole(gestures_library: Path, tmp_path: Path) -> None:
     out, report = tmp_path / "talk.usda", tmp_path / "r.json"
-    run("fill", BODY, "--library", library_file, "-o", out, "--report", report)
+    run("fill", BODY, "--library", gestures_library, "-o", out, "--report", report)
     before, after = animation(BODY), animation(out)
     places = [list(after.GetJointsAttr().Get()).index(j) for j in before.GetJointsAttr().Get()]
     times = before.GetRotationsAttr().GetTimeSamples()
@@ -113,9 +106,9 @@ def test_body_is_untouched_and_report_is_whole(library_file: Path, tmp_path: Pat
     run("check", out)
 
 
-def test_alternatives_are_variants(library_file: Path, tmp_path: Path) -> None:
+def test_alternatives_are_variants(gestures_library: Path, tmp_path: Path) -> None:
     out = tmp_path / "talk.usda"
-    arguments = ("fill", BODY, "--library", library_file, "--alternatives", 3)
+    arguments = ("fill", BODY, "--library", gestures_library, "--alternatives", 3)
     data = json.loads(run(*arguments, "-o", out, "--json").stdout)
     assert data["settings"]["alternatives"] == 3
     assert data["settings"]["segmentation"]["longest"] == 0.5
@@ -146,10 +139,12 @@ def test_alternatives_are_variants(library_file: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".usdz"])
-def test_one_file_keeps_the_alternatives(library_file: Path, tmp_path: Path, suffix: str) -> None:
+def test_one_file_keeps_the_alternatives(
+    gestures_library: Path, tmp_path: Path, suffix: str
+) -> None:
     over, flat = tmp_path / "over.usdc", tmp_path / "deep" / f"flat{suffix}"
     flat.parent.mkdir()
-    arguments = ("fill", BODY, "--library", library_file, "--alternatives", 2, "--side", "left")
+    arguments = ("fill", BODY, "--library", gestures_library, "--alternatives", 2, "--side", "left")
     run(*arguments, "-o", over)
     run(*arguments, "-o", flat, "--flatten")
     moved = flat.rename(tmp_path / f"moved{suffix}")
@@ -187,10 +182,10 @@ def test_limits_hold_and_results_repeat(body: Clip, library: MotionLibrary) -> N
 
 
 def test_the_clip_itself_is_not_used(
-    library: MotionLibrary, library_file: Path, tmp_path: Path
+    library: MotionLibrary, gestures_library: Path, tmp_path: Path
 ) -> None:
     copy = SAMPLES / "gestures" / "ok_01.usdc"
-    text = run("fill", copy, "--library", library_file, "-o", tmp_path / "a.usda", "--replace")
+    text = run("fill", copy, "--library", gestures_library, "-o", tmp_path / "a.usda", "--replace")
     assert "not used, since it is the same clip: ok_01" in text.output
     clip = usdhand.read_clip(copy)
     filled = fill_fingers(replace(clip, name="other"), library, replace_motion=True)
@@ -362,10 +357,12 @@ def test_one_clip_of_a_richer_rig_does_not_switch_off_the_others(
     assert library.clips[0].name in text
 
 
-def test_both_hands_as_one_have_figures_of_their_own(library_file: Path, tmp_path: Path) -> None:
+def test_both_hands_as_one_have_figures_of_their_own(
+    gestures_library: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "o.usda"
     data = json.loads(
-        run("fill", BODY, "--library", library_file, "-o", out, "--couple", "--json").stdout
+        run("fill", BODY, "--library", gestures_library, "-o", out, "--couple", "--json").stdout
     )
     left, right = (data["hands"][s]["seams"] for s in ("left", "right"))
     assert left["times_s"] == right["times_s"]
@@ -417,25 +414,25 @@ def test_clips_of_absurd_size_are_refused(tmp_path: Path, value: float, joint: s
     assert f"{joint} is {value:.3g} cm from its parent" in text
 
 
-def test_takes_with_still_fingers_are_no_truth(library_file: Path) -> None:
-    result = run("evaluate", library_file, "--takes", BODY, "--takes", FULL, "--json")
+def test_takes_with_still_fingers_are_no_truth(gestures_library: Path) -> None:
+    result = run("evaluate", gestures_library, "--takes", BODY, "--takes", FULL, "--json")
     data = json.loads(result.stdout)
     assert {take["take"] for take in data["takes"]} == {FULL.stem}
     [left] = data["left_out"]
     assert left["path"] == BODY.stem
     assert "left and right fingers do not move" in left["reason"]
-    run("evaluate", library_file, "--takes", BODY, code=3)
+    run("evaluate", gestures_library, "--takes", BODY, code=3)
 
 
 @pytest.mark.parametrize("wrong", ["nothing", "clip", "body is library"])
-def test_wrong_inputs_are_refused(library_file: Path, tmp_path: Path, wrong: str) -> None:
-    body, given = BODY, library_file
+def test_wrong_inputs_are_refused(gestures_library: Path, tmp_path: Path, wrong: str) -> None:
+    body, given = BODY, gestures_library
     if wrong == "nothing":
         given = tmp_path / "none.usdc"
     elif wrong == "clip":
         given = BODY
     else:
-        body = library_file
+        body = gestures_library
     out = tmp_path / "a.usda"
     code = 2 if wrong == "body is library" else 3
     text = run("fill", body, "--library", given, "-o", out, code=code).output
@@ -457,9 +454,9 @@ def test_paper_preset(body: Clip, library: MotionLibrary) -> None:
 
 
 @pytest.mark.slow
-def test_evaluate_on_the_samples(library_file: Path) -> None:
+def test_evaluate_on_the_samples(gestures_library: Path) -> None:
     def errors(preset: str) -> dict[str, dict[str, dict[str, float]]]:
-        text = run("evaluate", library_file, "--preset", preset, "--json").stdout
+        text = run("evaluate", gestures_library, "--preset", preset, "--json").stdout
         data = json.loads(text)
         share = {m["name"]: m["share"] for m in data["label_agreement"]["metrics"]}
         both = share["P + 0.5 R"]
@@ -498,7 +495,7 @@ def test_held_out_real_takes() -> None:
 
 
 def test_a_body_that_starts_late_is_filled_in_its_own_time(
-    library_file: Path, tmp_path: Path
+    gestures_library: Path, tmp_path: Path
 ) -> None:
     """Time codes from 1001 on, as shots have them."""
     shifted, out = tmp_path / "late.usda", tmp_path / "out.usda"
@@ -513,7 +510,7 @@ def test_a_body_that_starts_late_is_filled_in_its_own_time(
     layer.pseudoRoot.SetInfo("upAxis", "Y")
     layer.pseudoRoot.SetInfo("metersPerUnit", 0.01)
     layer.Save()
-    arguments = ("--library", library_file, "--side", "left", "--json")
+    arguments = ("--library", gestures_library, "--side", "left", "--json")
     late = json.loads(run("fill", shifted, "-o", out, *arguments).stdout)
     usual = json.loads(run("fill", BODY, "-o", tmp_path / "usual.usda", *arguments).stdout)
     assert late["hands"] == usual["hands"]  # seconds from the first frame

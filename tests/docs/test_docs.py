@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-import shlex
 from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner
+from builders.shared_work import Shell
 from conftest import REPOSITORY
 
-from usdhand.cli import main
 from usdhand.cli.command import command_of
 from usdhand.requests.verbs import VERBS
 
@@ -57,19 +55,11 @@ def shown_commands(page: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if shown_commands(p)], ids=lambda p: p.name)
-def test_every_shown_command_runs(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, subtests: pytest.Subtests
-) -> None:
-    """In the order of the page, in a folder that has the samples and nothing else."""
-    (tmp_path / "samples").symlink_to(REPOSITORY / "samples")
-    monkeypatch.chdir(tmp_path)
+def test_every_shown_command_runs(page: Path, shell: Shell, subtests: pytest.Subtests) -> None:
+    """In the order of the page, with the samples and what the page has made, and nothing else."""
     for line in shown_commands(page):
         with subtests.test(line):
-            if not line.startswith("usdhand "):
-                exec(compile(line, page.name, "exec"), {})
-                continue
-            result = CliRunner().invoke(main, shlex.split(line)[1:])
-            assert result.exit_code == 0, result.output
+            shell = shell.after(line)
 
 
 def test_readme_and_reference_show_commands() -> None:

@@ -57,11 +57,9 @@ def test_equal_names_of_other_motion_are_used(tmp_path: Path) -> None:
     assert report["hands"]["right"]["segments"]
 
 
-def test_no_piece_is_played_twice_in_a_row(tmp_path: Path) -> None:
-    library, out = tmp_path / "l.usdc", tmp_path / "o.usda"
-    run("library", "build", SAMPLES / "gestures", "-o", library, "-q")
-    body = TALKS / "talk_01_body.usdc"
-    report = json.loads(run("fill", body, "--library", library, "-o", out, "--json").stdout)
+def test_no_piece_is_played_twice_in_a_row(gestures_library: Path, tmp_path: Path) -> None:
+    given = ("--library", gestures_library, "-o", tmp_path / "o.usda")
+    report = json.loads(run("fill", TALKS / "talk_01_body.usdc", *given, "--json").stdout)
     for hand in report["hands"].values():
         pieces = [(s["clip"], s["clip_start"]) for s in hand["segments"]]
         assert sum(a == b for a, b in pairwise(pieces)) <= len(pieces) // 20

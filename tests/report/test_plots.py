@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders.cli_runner import run
 from builders.clips import frames_of
+from builders.shared_work import SharedWork, few_gestures
 from conftest import REPOSITORY
 
 import usdhand
@@ -39,7 +39,6 @@ FULL = SAMPLES / "conversations" / "talk_01_full.usdc"
 BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
 HANDS = SAMPLES / "hands" / "talk_01_hands_a.usdc"
 OK = SAMPLES / "gestures" / "ok_01.usdc"
-GESTURES = [SAMPLES / "gestures" / f"{x}.usdc" for x in ("ok_01", "ok_02", "big_01", "big_02")]
 PINS = ("1:1", "181:403")
 
 
@@ -59,10 +58,8 @@ def reduction(talk: Clip) -> Reduction:
 
 
 @pytest.fixture(scope="module")
-def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("library") / "gestures.usdc"
-    run("library", "build", *GESTURES, "-o", path)
-    return path
+def library_file(shared_work: SharedWork) -> Path:
+    return few_gestures(shared_work)
 
 
 @pytest.fixture(scope="module")
@@ -209,7 +206,9 @@ def test_counts_that_no_thresholds_leave_have_no_error() -> None:
 
 
 def test_several_clips_are_one_motion() -> None:
-    found = usdhand.reduce_hands([usdhand.read_clip(path) for path in GESTURES[:2]])
+    found = usdhand.reduce_hands(
+        [usdhand.read_clip(SAMPLES / "gestures" / f"ok_0{i}.usdc") for i in (1, 2)]
+    )
     figure = reducing.errors(found)
     [point] = next(xy for label, xy in lines(figure.axes[0]).items() if "this rig" in label)
     together = np.concatenate(

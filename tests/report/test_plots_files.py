@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from builders.cli_runner import run
 from builders.preview_pages import page_data
+from builders.shared_work import SharedWork, few_gestures
 from conftest import REPOSITORY, shared_data
 
 import usdhand
@@ -26,15 +27,12 @@ SAMPLES = REPOSITORY / "samples"
 BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
 HANDS = SAMPLES / "hands" / "talk_01_hands_a.usdc"
 OK = SAMPLES / "gestures" / "ok_01.usdc"
-GESTURES = [SAMPLES / "gestures" / f"{x}.usdc" for x in ("ok_01", "ok_02", "big_01", "big_02")]
 PINS = ("1:1", "181:403")
 
 
 @pytest.fixture(scope="module")
-def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("library") / "gestures.usdc"
-    run("library", "build", *GESTURES, "-o", path)
-    return path
+def library_file(shared_work: SharedWork) -> Path:
+    return few_gestures(shared_work)
 
 
 def test_files_are_the_same_every_time_and_ask_for_nothing(tmp_path: Path) -> None:
