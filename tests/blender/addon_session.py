@@ -14,7 +14,6 @@ process with usd-core.
 import json
 import os
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -40,7 +39,7 @@ def main(session: dict) -> dict:
     for edit in session.get("edits", ()):
         change(armature, *edit)
     if "poses" in session:
-        said["milliseconds"] = dump(armature, session["frames"], session["poses"])
+        dump(armature, session["frames"], session["poses"])
     said |= facts(armature)
     if "import" in session:
         said["panel"] = drawn(armature)
@@ -86,19 +85,16 @@ def curves(armature: bpy.types.Object) -> list[bpy.types.FCurve]:
     return [c for b in bags for c in b.fcurves]
 
 
-def dump(armature: bpy.types.Object, frames: list[float], target: str) -> float:
-    """Write the pose at some frames; return how long a frame takes in milliseconds."""
+def dump(armature: bpy.types.Object, frames: list[float], target: str) -> None:
+    """Write the pose at some frames."""
     scene, bones = bpy.context.scene, armature.data.bones
-    posed, clock = [], 0.0
+    posed = []
     for frame in frames:
-        begin = time.perf_counter()
         scene.frame_set(int(frame), subframe=frame % 1)
-        clock += time.perf_counter() - begin
         world = armature.matrix_world
         posed.append([np.array(world @ armature.pose.bones[b.name].matrix) for b in bones])
     rest = [np.array(armature.matrix_world @ b.matrix_local) for b in bones]
     np.savez(target, names=[b.name for b in bones], rest=rest, posed=posed)
-    return 1e3 * clock / len(frames)
 
 
 def facts(armature: bpy.types.Object) -> dict:
