@@ -216,8 +216,12 @@ def test_true_pins_around_frames_that_were_held(count: int) -> None:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize(("body", "hands"), [(3, 6), (30, 9), (5, 33)])
-def test_three_pins_on_another_sign_act_between_them_only(body: int, hands: int) -> None:
+@pytest.mark.parametrize(
+    ("body", "hands", "taken_from"), [(3, 6, "right"), (30, 9, None), (5, 33, None)]
+)
+def test_three_pins_on_another_sign_act_between_them_only(
+    body: int, hands: int, taken_from: Side | None
+) -> None:
     """The hand clip shows another sign: much is ambiguous, and pins still act locally."""
     files = [files[0] for files in known_pairs(shared_data("studiogalt", "full"))]
     a, b = read_clip(files[body]), read_clip(files[hands])
@@ -229,7 +233,8 @@ def test_three_pins_on_another_sign_act_between_them_only(body: int, hands: int)
     pins = (Pin(*warp[first]), Pin(warp[at, 0], moved), Pin(*warp[last]))
     pins = tuple(replace(pin, side="right") for pin in pins)
     pinned = splice(a, b, *found, SpliceSettings(pins=pins)).hands
-    if pinned["left"].taken_from is None:
+    assert pinned["left"].taken_from == taken_from
+    if taken_from is None:
         assert np.array_equal(pinned["left"].warp, free["left"].warp)
     apart = np.abs(pinned["right"].warp[:, 1] - warp[:, 1])
     assert pinned["right"].warp[at, 1] == pytest.approx(moved, abs=1e-6)
