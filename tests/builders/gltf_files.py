@@ -168,3 +168,37 @@ def from_skeleton(skeleton: Skeleton, names: Sequence[str] | None = None) -> Glt
     for joint, parent in enumerate(skeleton.parents):
         file.json["nodes"][int(parent) + 1].setdefault("children", []).append(joint + 1)
     return file
+
+
+def vrm1(bones: dict[int, str], name: str = "VRMC_vrm") -> dict[str, Any]:
+    return {name: {"humanoid": {"humanBones": {b: {"node": n} for n, b in bones.items()}}}}
+
+
+def everything() -> GltfFile:
+    """A file with a bit of all that is read."""
+    file = GltfFile()
+    file.animation("a")
+    armature = file.node("Armature", matrix=np.diag([0.01, 0.01, 0.01, 1.0]).ravel().tolist())
+    nodes = arm(file, armature)
+    shared = file.accessor(np.arange(6) / 30.0)
+    for i, node in enumerate(nodes):
+        file.curve(node, "rotation", shared, turns(6, i), ["LINEAR", "STEP"][i % 2])
+    spline = np.random.default_rng(1).normal(size=(18, 3))
+    file.curve(nodes[0], "translation", shared, spline, "CUBICSPLINE")
+    file.curve(nodes[2], "scale", shared, 1.0 + 0.1 * np.abs(spline[:6]))
+    packed = file.accessor(turns(6, 9), "i2", stride=12, normalized=True)
+    file.curve(armature, "rotation", shared, packed)
+    sparse = {
+        "count": 2,
+        "indices": {"bufferView": file.view(bytes([0, 4])), "componentType": 5121},
+        "values": {"bufferView": file.view(np.arange(6.0).astype("<f4").tobytes())},
+    }
+    zeros = {"componentType": 5126, "count": 6, "type": "VEC3", "sparse": sparse}
+    file.curve(nodes[4], "translation", shared, file.add("accessors", zeros))
+    file.json["meshes"] = [{"primitives": []}]
+    bind = np.tile(np.eye(4), (6, 1, 1))
+    bind[:, 1, 3] = range(6)
+    file.node("Body", mesh=0, skin=file.skin(nodes, bind, name="Body", skeleton=armature))
+    file.skin(nodes[3:], name="Glove")
+    file.json["extensions"] = vrm1({nodes[0]: "hips", nodes[3]: "leftHand"})
+    return file

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders.gltf_files import GltfFile, from_skeleton, turns
+from builders.gltf_files import GltfFile, from_skeleton, turns, vrm1
 from builders.rigs import build
 
 from usdhand.errors import InputError
@@ -73,10 +73,6 @@ def world(file: GltfFile, node: int) -> np.ndarray:
 def vrm0(bones: dict[int, str]) -> dict[str, Any]:
     listed = [{"bone": bone, "node": node} for node, bone in bones.items()]
     return {"VRM": {"humanoid": {"humanBones": [*listed, {"bone": "jaw", "node": -1}]}}}
-
-
-def vrm1(bones: dict[int, str], name: str = "VRMC_vrm") -> dict[str, Any]:
-    return {name: {"humanoid": {"humanBones": {b: {"node": n} for n, b in bones.items()}}}}
 
 
 def aliases_by_name(clip: Clip) -> dict[str, str]:
