@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.cli_runner import run
+from builders.shared_work import SharedWork
 from conftest import REPOSITORY
 
 import usdhand
@@ -42,20 +43,30 @@ class Results:
     splice_report: Path
     rig: Path
 
+    @classmethod
+    def within(cls, folder: Path) -> Results:
+        """The files in a folder that `make_results` filled."""
+        names = ("filled.usda", "fill.json", "spliced.usda", "splice.json", "rig.usda")
+        return cls(*(folder / name for name in names))
+
 
 def make_results(folder: Path) -> Results:
     """Run the verbs on short samples."""
     library = folder / "library.usdc"
     run("library", "build", *(GESTURES / f"{n}.usdc" for n in ("ok_01", "ok_02", "big_01")),
         "-o", library, "-q")  # fmt: skip
-    made = Results(*(folder / n for n in ("filled.usda", "fill.json", "spliced.usda",
-                                          "splice.json", "rig.usda")))  # fmt: skip
+    made = Results.within(folder)
     run("fill", GESTURES / "ok_03.usdc", "--replace", "--library", library, "--alternatives", "2",
         "-o", made.filled, "--report", made.fill_report, "-q")  # fmt: skip
     run("splice", GESTURES / "ok_03.usdc", GESTURES / "ok_04.usdc", "-o", made.spliced,
         "--pin", "1:1", "--report", made.splice_report, "-q")  # fmt: skip
     run("reduce", GESTURES / "ok_03.usdc", "-o", made.rig, "-q")
     return made
+
+
+def shared_results(work: SharedWork) -> Results:
+    """The same files for all tests of a session, for reading only."""
+    return Results.within(work.folder("results", make_results))
 
 
 def page_data(page: Path) -> dict[str, Any]:
