@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import re
+import subprocess
+import sys
+from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -14,7 +19,11 @@ from usdhand.cli.command import command_of
 from usdhand.requests.verbs import VERBS
 
 REFERENCE = (REPOSITORY / "docs" / "command-line.md").read_text(encoding="utf-8")
-PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
+PAGES = [
+    *sorted(REPOSITORY.glob("*.md")),
+    REPOSITORY / "samples" / "README.md",
+    *sorted((REPOSITORY / "docs").rglob("*.md")),
+]
 
 
 def commands() -> list[tuple[str, click.Command]]:
@@ -90,3 +99,49 @@ def test_the_map_from_papers_names_modules_that_are_there() -> None:
         for name in names:
             places = [Path(name), *(folder / name for folder in folders)]
             assert any((REPOSITORY / place).exists() for place in places), name
+
+
+def resolved(name: str) -> Any:
+    """The module, class, function or field that a dotted name stands for."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        try:
+            found: Any = importlib.import_module(".".join(parts[:count]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[count:]:
+            own = {f.name: f for f in fields(found)} if is_dataclass(found) else {}
+            found = getattr(found, part) if hasattr(found, part) else own[part]
+        return found
+    raise ModuleNotFoundError(name)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_names_that_pages_use_are_there(page: Path) -> None:
+    """Dotted names of the package, in code or in directives of the API page."""
+    text = page.read_text(encoding="utf-8")
+    names = re.findall(r"(?:`|:: )(usdhand(?:\.[A-Za-z_]\w*)+)\b(?![/:])", text)
+    for name in sorted(set(names) - {"usdhand.toml"}):
+        try:
+            resolved(name)
+        except (ModuleNotFoundError, AttributeError, KeyError) as error:
+            pytest.fail(f"{page.name} names {name}, which is not there ({error!r})")
+
+
+def test_a_name_that_is_not_there_is_seen() -> None:
+    assert resolved("usdhand.verbs.fill.run").__name__ == "run"
+    for wrong in ("usdhand.verbs.nothing", "usdhand.verbs.fill.nothing", "nothing"):
+        with pytest.raises((ModuleNotFoundError, AttributeError, KeyError)):
+            resolved(wrong)
+
+
+def test_the_picture_of_the_architecture_is_what_its_script_draws(tmp_path: Path) -> None:
+    """The layers in it come from the contracts of import-linter."""
+    folder = tmp_path / "docs" / "pictures"
+    folder.mkdir(parents=True)
+    script = REPOSITORY / "docs" / "pictures" / "make_architecture.py"
+    (folder / script.name).write_bytes(script.read_bytes())
+    (tmp_path / "pyproject.toml").write_bytes((REPOSITORY / "pyproject.toml").read_bytes())
+    subprocess.run([sys.executable, folder / script.name], check=True)
+    drawn = (folder / "architecture.svg").read_text(encoding="utf-8")
+    assert drawn == script.with_name("architecture.svg").read_text(encoding="utf-8")
