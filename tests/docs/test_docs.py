@@ -15,6 +15,7 @@ import pytest
 from builders.shared_work import Shell
 from conftest import REPOSITORY
 
+import usdhand
 from usdhand.cli.command import command_of
 from usdhand.requests.verbs import VERBS
 
@@ -145,3 +146,8 @@ def test_the_picture_of_the_architecture_is_what_its_script_draws(tmp_path: Path
     subprocess.run([sys.executable, folder / script.name], check=True)
     drawn = (folder / "architecture.svg").read_text(encoding="utf-8")
     assert drawn == script.with_name("architecture.svg").read_text(encoding="utf-8")
+
+
+def test_the_citation_is_of_this_version() -> None:
+    citation = (REPOSITORY / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {usdhand.__version__}\n" in citation
