@@ -167,7 +167,7 @@ def test_times_that_cannot_be_kept_are_moved(seconds: float, reason: str, tmp_pa
     clip = sample()
     origin = replace(clip.origin, first_time_code=seconds * 30.0)
     [problem] = write_clip(replace(clip, origin=origin), tmp_path / "take.glb")
-    assert problem.code == "start-moved"
+    assert problem.code == "start-time"
     assert reason in problem.message
     again = read_clip(tmp_path / "take.glb")
     assert (again.start, again.fps, len(again)) == (0.0, 30.0, len(clip))

@@ -16,19 +16,16 @@ def scale_problems(linear: Array, where: str) -> tuple[Problem, ...]:
     singular = np.linalg.svd(linear, compute_uv=False)
     largest, smallest = singular.max(axis=1), singular.min(axis=1)
     uneven = UNEVEN * smallest
-    found = {
-        "zero-scale": ((smallest <= FLAT).any(), "a zero scale stands above the skeleton"),
-        "non-uniform-scale": (
-            (largest > smallest + uneven).any(),
-            "a non-uniform scale stands above the skeleton: bones are read with its mean",
-        ),
-        "mirrored": (
-            (np.linalg.det(linear) < 0).any(),
-            "a mirroring stands above the skeleton: sides may swap",
-        ),
-        "animated-scale": (
-            (np.abs(smallest - smallest[0]) > uneven[0]).any(),
-            "the scale above the skeleton changes over time: that of the first frame is read",
-        ),
-    }
-    return tuple(Problem(code, text, where) for code, (there, text) in found.items() if there)
+    found = []
+    if (smallest <= FLAT).any():
+        found.append(Problem("zero-scale", "a zero scale stands above the skeleton", where))
+    if (largest > smallest + uneven).any():
+        message = "a non-uniform scale stands above the skeleton: bones are read with its mean"
+        found.append(Problem("non-uniform-scale", message, where))
+    if (np.linalg.det(linear) < 0).any():
+        message = "a mirroring stands above the skeleton: sides may swap"
+        found.append(Problem("mirrored", message, where))
+    if (np.abs(smallest - smallest[0]) > uneven[0]).any():
+        message = "the scale above the skeleton changes over time: that of the first frame is read"
+        found.append(Problem("animated-scale", message, where))
+    return tuple(found)

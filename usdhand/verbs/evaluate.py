@@ -124,7 +124,7 @@ def run(request: EvaluateRequest, journal: Journal) -> Outcome:
         )
         left_out = [*unread, *left]
         for take in left_out:
-            journal.warn(take.code, f"left out: {take.file}: {take.message}")
+            journal.warn("left-out", f"left out: {take.file}: {take.message}")
         if not errors:
             raise InputError("No clip could be filled from the others.")
 

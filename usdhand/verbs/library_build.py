@@ -96,7 +96,7 @@ def _tell(
         message = f"{entry.file} of the old library cannot be used: {entry.message}"
         journal.warn("damaged", message)
     for entry in built.library.left_out:
-        journal.warn(entry.code, f"left out: {entry.file}: {entry.message}")
+        journal.warn("left-out", f"left out: {entry.file}: {entry.message}")
     if built.removed:
         journal.warn("removed", _what_is_removed(built.removed))
     if built.unmatched:

@@ -54,8 +54,7 @@ class Journal:
 
     def fail(self, error: UsdHandError, file: object = "") -> None:
         """Tell an error that ends the work on one file, not the run."""
-        code = type(error).__name__.removesuffix("Error").lower()
-        self.tell(Problem(code, str(error), severity="error", file=str(file)))
+        self.tell(Problem(error.code, str(error), severity="error", file=str(file)))
 
     def about(self, file: object, problems: Iterable[Problem], *told: Severity) -> None:
         """Tell the problems of a file that are as severe as ``told``, and keep the others."""

@@ -123,7 +123,7 @@ def _origin(scene: Scene, rig: FbxSkeleton) -> Origin:
 
 def _scene_problems(scene: Scene, rig: FbxSkeleton) -> Iterator[Problem]:
     if not scene.says_axes:
-        yield Problem("no-axes", "the file does not say which axis is up: Y is taken")
+        yield Problem("guessed-up-axis", "the file does not say which axis is up: Y is taken")
     if scene.bind.keys().isdisjoint(rig.nodes):
         message = "the file has no bind pose: the nodes' own transforms stand in for it"
         yield Problem("missing-bind", message, severity="note")

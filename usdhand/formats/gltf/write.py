@@ -150,7 +150,7 @@ def _times(clip: Clip) -> tuple[Array, tuple[Problem, ...]]:
         return times, ()
     reason = "begin before zero" if times[0] < 0 else "lose frames that late"
     message = f"the clip starts at {clip.start:g} s; glTF times cannot {reason}: written from 0 s"
-    problems = [Problem("start-moved", message, clip.name)]
+    problems = [Problem("start-time", message, clip.name)]
     if not _survive(frames, clip.fps):
         message = "the clip is too long for the precision of glTF times: frames are uneven"
         problems.append(Problem("uneven-times", message, clip.name))

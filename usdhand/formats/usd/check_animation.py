@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from pxr import Usd, UsdSkel
 from usdhand.formats.usd.check_skeleton import some
 from usdhand.formats.usd.stage import binding_prim
 from usdhand.motion import leaf_name
-from usdhand.problems import Problem, Severity
+from usdhand.problems import Problem
 
 UNIT_TOLERANCE = 1e-3
 TIME_TOLERANCE = 1e-6  # time codes
@@ -126,19 +126,24 @@ class SampledAttribute:
 def _value_findings(source: Usd.Prim) -> Iterator[Problem]:
     animation = UsdSkel.Animation(source)
     joints = [leaf_name(str(joint)) for joint in animation.GetJointsAttr().Get() or ()]
-    for attribute in (
-        animation.GetRotationsAttr(),
-        animation.GetTranslationsAttr(),
-        animation.GetScalesAttr(),
+    where = str(source.GetPath())
+    so = "without all three of rotations, translations and scales UsdSkel shows the rest pose"
+    for attribute, missing in (
+        (
+            animation.GetRotationsAttr(),
+            Problem("missing-rotations", f"there are no rotations: {so}", where, "error"),
+        ),
+        (
+            animation.GetTranslationsAttr(),
+            Problem("missing-translations", f"there are no translations: {so}", where, "error"),
+        ),
+        (
+            animation.GetScalesAttr(),
+            Problem("missing-scales", f"there are no scales: {so}", where, "error"),
+        ),
     ):
         if not attribute.HasAuthoredValue():
-            yield Problem(
-                f"missing-{attribute.GetName()}",
-                f"there are no {attribute.GetName()}: without all three of rotations, "
-                "translations and scales UsdSkel shows the rest pose",
-                str(source.GetPath()),
-                "error",
-            )
+            yield missing
             continue
         times = attribute.GetTimeSamples()
         query = Usd.AttributeQuery(attribute)
@@ -159,31 +164,31 @@ def _track_findings(track: SampledAttribute) -> Iterator[Problem]:
     if not whole or not count:
         return
     values = np.array([track.rows[i] for i in whole], dtype=np.float64)
-    for severity, code, message, bad in _number_rules(values):
+    for rule, bad in _number_rules(values, track.path):
         if bad.any():
             names = [track.joints[int(j)] for j in np.flatnonzero(bad.any(axis=0))]
             frames = [whole[int(i)] for i in np.flatnonzero(bad.any(axis=1))]
-            yield Problem(
-                code, f"{message}: {some(names)} {track.at(frames)}", track.path, severity
-            )
+            yield replace(rule, message=f"{rule.message}: {some(names)} {track.at(frames)}")
 
 
 def _number_rules(
-    values: NDArray[np.float64],
-) -> Iterator[tuple[Severity, str, str, NDArray[np.bool_]]]:
-    """Severity, code and message of each rule, with the (samples, joints) that break it."""
-    yield "error", "not-a-number", "not a number", ~np.all(np.isfinite(values), axis=2)
+    values: NDArray[np.float64], where: str
+) -> Iterator[tuple[Problem, NDArray[np.bool_]]]:
+    """The problem of each rule, with the (samples, joints) that break it."""
+    finite = np.all(np.isfinite(values), axis=2)
+    yield Problem("not-a-number", "not a number", where, "error"), ~finite
     if values.shape[2] != 4:
         return
     norms = np.linalg.norm(values, axis=2)
     zero = norms < UNIT_TOLERANCE
-    yield "error", "zero-quaternion", "zero-length quaternion", zero
+    yield Problem("zero-quaternion", "zero-length quaternion", where, "error"), zero
     long = ~zero & (np.abs(norms - 1.0) > UNIT_TOLERANCE)
-    yield "error", "non-unit-quaternion", "quaternion of another length than one", long
+    message = "quaternion of another length than one"
+    yield Problem("non-unit-quaternion", message, where, "error"), long
     flips = np.zeros(norms.shape, dtype=bool)
     flips[1:] = np.einsum("tji,tji->tj", values[1:], values[:-1]) < 0
     message = (
         "quaternions change sign between neighbours; tools that interpolate the four numbers turn "
         "the long way"
     )
-    yield "warning", "sign-flip", message, flips
+    yield Problem("sign-flip", message, where), flips

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,19 @@ from usdhand.motion import leaf_name, parents_from_paths
 from usdhand.problems import Problem, Severity
 
 SHOWN = 3  # examples in one message
+# What may be wrong with a pose: it is not there, has another length, or no usable matrices.
+POSE_PROBLEMS = {
+    "bind": (
+        Problem("missing-bind", "", severity="error"),
+        Problem("bind-length", "", severity="error"),
+        Problem("bad-bind", "", severity="error"),
+    ),
+    "rest": (
+        Problem("missing-rest", "", severity="error"),
+        Problem("rest-length", "", severity="error"),
+        Problem("bad-rest", "", severity="error"),
+    ),
+}
 
 
 def skeleton_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
@@ -31,7 +45,7 @@ def skeleton_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
     yield from _pose_findings(skeleton, joints, where)
     for problem in world_problems(skeleton):
         severity: Severity = "error" if problem.code == "zero-scale" else "warning"
-        yield Problem(problem.code, problem.message, problem.where, severity)
+        yield replace(problem, severity=severity)
 
 
 def _name_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
@@ -80,27 +94,16 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
         ("rest", api.GetRestTransformsAttr()),
     ):
         matrices = np.array(attribute.Get() or [], dtype=np.float64).reshape(-1, 4, 4)
+        missing, other_length, bad = (replace(p, where=where) for p in POSE_PROBLEMS[name])
         if not len(matrices):
-            yield Problem(
-                f"missing-{name}",
-                f"there are no {name} transforms, without which UsdSkel and Blender cannot pose it",
-                where,
-                "error",
-            )
+            message = f"there are no {name} transforms, without which UsdSkel and Blender cannot"
+            yield replace(missing, message=f"{message} pose it")
         elif len(matrices) != len(joints):
-            yield Problem(
-                f"{name}-length",
-                f"{len(matrices)} {name} transforms for {len(joints)} joints",
-                where,
-                "error",
-            )
-        elif bad := [joints[int(j)] for j in np.flatnonzero(~_usable(matrices))]:
-            yield Problem(
-                f"bad-{name}",
-                f"{len(bad)} {name} transforms are singular or no numbers: {some(bad)}",
-                where,
-                "error",
-            )
+            message = f"{len(matrices)} {name} transforms for {len(joints)} joints"
+            yield replace(other_length, message=message)
+        elif singular := [joints[int(j)] for j in np.flatnonzero(~_usable(matrices))]:
+            message = f"{len(singular)} {name} transforms are singular or no numbers"
+            yield replace(bad, message=f"{message}: {some(singular)}")
         else:
             poses[name] = matrices
     if len(poses) == 2:

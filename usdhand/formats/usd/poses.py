@@ -45,12 +45,13 @@ def authored_poses(
     rest = _matrices(skeleton.GetRestTransformsAttr().Get(), joints, scale)
     bind = _matrices(skeleton.GetBindTransformsAttr().Get(), joints, scale)
     where = str(character.skeleton.GetPath())
-    problems = tuple(
-        Problem(f"missing-{name}", f"{name} transforms are missing or do not fit the joints", where)
-        for name, value in (("bind", bind), ("rest", rest))
-        if value is None
-    )
-    return AuthoredPoses(rest, bind), problems
+    unusable = "transforms are missing or do not fit the joints"
+    problems = []
+    if bind is None:
+        problems.append(Problem("missing-bind", f"bind {unusable}", where))
+    if rest is None:
+        problems.append(Problem("missing-rest", f"rest {unusable}", where))
+    return AuthoredPoses(rest, bind), tuple(problems)
 
 
 def placed_skeleton(
@@ -127,4 +128,4 @@ def _repair_unskinned(
         "placed by the first frame"
     )
     where = ", ".join(repaired[:3]) + (", ..." if len(repaired) > 3 else "")
-    return replace(skeleton, bind=bind), (Problem("unplaced-bind", message, where),)
+    return replace(skeleton, bind=bind), (Problem("identity-bind", message, where),)

@@ -209,13 +209,11 @@ def _animation_problems(
     if still:
         message = f"{still} joints are not animated and stay at rest"
         yield Problem("fewer-joints", message, where, "note")
-    for track, name in ((tracks.translations, "translations"), (tracks.scales, "scales")):
-        if track is None:
-            message = (
-                f"the animation has no {name}, so USD shows the rest pose; the rotations are read "
-                "all the same"
-            )
-            yield Problem(f"missing-{name}", message, where)
+    so = "so USD shows the rest pose; the rotations are read all the same"
+    if tracks.translations is None:
+        yield Problem("missing-translations", f"the animation has no translations, {so}", where)
+    if tracks.scales is None:
+        yield Problem("missing-scales", f"the animation has no scales, {so}", where)
 
 
 def _name_problems(character: Character, joints: tuple[str, ...]) -> Iterator[Problem]:
