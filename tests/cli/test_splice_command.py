@@ -162,8 +162,8 @@ def test_a_clip_that_shows_a_part_is_refused_with_the_pins_that_place_it(
     with pytest.raises(UsageError, match=r"After the pin 1:1 the body lasts.*--pin 7:1:18"):
         splice_hands(read_clip(BODY), read_clip(HANDS), pins=["1:1"])
     other = SAMPLES / "conversations" / "talk_02_body.usdc"
-    notes = splice_hands(read_clip(other), read_clip(HANDS)).notes
-    assert any("Nothing in the longer clip is like the shorter" in note for note in notes)
+    notes = splice_hands(read_clip(other), read_clip(HANDS)).problems
+    assert any("Nothing in the longer clip is like the shorter" in str(note) for note in notes)
     with pytest.raises(UsageError, match=r"The body is like the hand clip from 0\.. s"):
         splice_hands(read_clip(HANDS), read_clip(FULL))
 
@@ -198,12 +198,12 @@ def without_fingers(clip: Clip, *digits: str) -> Clip:
 def test_long_differences_are_worth_a_warning() -> None:
     body, hands = read_clip(BODY), read_clip(HANDS)
     result = splice_hands(body, hands, pins=["1:1", "451:403"])
-    assert any("Between the pins 1:1 and 451:403" in note for note in result.notes)
-    [note] = splice_hands(body, hands, pins=["1:1", "181:403"]).notes
-    assert "the hand clip ends at time code 181 of the body" in note
-    assert "(left and right)" in note
-    [note] = splice_hands(body, hands, pins=["481:1", "680:403"]).notes
-    assert "the hand clip begins at time code 481 of the body" in note
+    assert any("Between the pins 1:1 and 451:403" in str(note) for note in result.problems)
+    [note] = splice_hands(body, hands, pins=["1:1", "181:403"]).problems
+    assert "the hand clip ends at time code 181 of the body" in str(note)
+    assert "(left and right)" in str(note)
+    [note] = splice_hands(body, hands, pins=["481:1", "680:403"]).problems
+    assert "the hand clip begins at time code 481 of the body" in str(note)
     with pytest.raises(UsageError, match="not spliced"):
         splice_hands(body, read_clip(RIGHT), pins=["left:1:1"])
     with pytest.raises(UsageError, match="trunk"):
@@ -232,9 +232,9 @@ def test_fingers_that_do_not_move(run: Run, tmp_path: Path) -> None:
     left = find_hands(full).frames["left"].joints
     rotations = full.rotations.copy()
     rotations[:, left] = rotations[:1, left]
-    [note] = splice_hands(full, full.with_rotations(rotations)).notes
-    assert "the fingers of the left hand do not move in the hand clip" in note
-    assert "replace moving ones" in note
+    [note] = splice_hands(full, full.with_rotations(rotations)).problems
+    assert "the fingers of the left hand do not move in the hand clip" in str(note)
+    assert "replace moving ones" in str(note)
     assert "are the same" in run(FULL, FULL, "-o", out, "-n").output
 
 
@@ -261,7 +261,7 @@ def test_pins_tell_the_timing_of_arms_that_rest() -> None:
     with pytest.raises(InputError, match=r"nothing tells .* Pins can"):
         splice_hands(full, still, pins=["300:300"])
     result = splice_hands(full, still, pins=["1:1", "300:350", "680:680"])
-    assert any("the timing is that of the pins" in note for note in result.notes)
+    assert any("the timing is that of the pins" in str(note) for note in result.problems)
     for alignment in result.hands.values():
         assert np.interp(299 / 30, *alignment.warp.T) == pytest.approx(349 / 30)
     one = splice_hands(full, still, pins=["left:1:1", "left:680:680"])

@@ -186,7 +186,7 @@ def test_a_hand_that_hardly_moves_follows_the_other() -> None:
     result = splice(a, b, find_hands(a), find_hands(b))
     assert result.hands["left"].taken_from == "right"
     assert np.array_equal(result.hands["left"].warp, result.hands["right"].warp)
-    assert any("left hand hardly moves" in note for note in result.notes)
+    assert any("left hand hardly moves" in str(note) for note in result.problems)
 
 
 @pytest.mark.real_data

@@ -17,7 +17,7 @@ def splice_result(spliced: Spliced) -> dict[str, Any]:
     body = spliced.clip
     return {
         "hands": {side: _hand_data(alignment, body) for side, alignment in spliced.hands.items()},
-        "notes": list(spliced.notes),
+        "notes": [str(problem) for problem in spliced.problems],
         "fps": rounded(body.fps),
         "frames": len(body),
     }

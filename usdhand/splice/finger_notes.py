@@ -11,6 +11,7 @@ from usdhand.anatomy.channels import encode, fingers_move
 from usdhand.errors import InputError
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
+from usdhand.problems import Problem
 
 # The last pose of a hand clip that stays for as many seconds is worth a note.
 HELD_S = 0.5
@@ -18,7 +19,7 @@ HELD_S = 0.5
 
 def still_finger_notes(
     body: Clip, hand_clip: Clip, body_hands: Hands, hand_hands: Hands, sides: Sequence[Side]
-) -> list[str]:
+) -> list[Problem]:
     """Notes on hands whose fingers do not move in the hand clip.
 
     Raises
@@ -36,11 +37,12 @@ def still_finger_notes(
     notes = []
     for side in still:
         note = f"the fingers of the {side} hand do not move in the hand clip {hand_clip.name}"
-        notes.append(note + (", and replace moving ones of the body" if side in lost else ""))
+        note += ", and replace moving ones of the body" if side in lost else ""
+        notes.append(Problem("still-fingers", note))
     return notes
 
 
-def held_pose_notes(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) -> list[str]:
+def held_pose_notes(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) -> list[Problem]:
     """Notes on hands that hold the hand clip's first or last pose for long.
 
     Parameters
@@ -60,7 +62,10 @@ def held_pose_notes(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) ->
             at = body.time_code(after)
             text = f"ends at time code {at:g} of the body, fingers hold its last pose from there on"
             held.setdefault(text, []).append(side)
-    return [f"the hand clip {text} ({' and '.join(s)})" for text, s in held.items()]
+    return [
+        Problem("held-pose", f"the hand clip {text} ({' and '.join(s)})")
+        for text, s in held.items()
+    ]
 
 
 def _move(clip: Clip, frames: HandFrames) -> bool:

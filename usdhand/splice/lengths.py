@@ -8,6 +8,7 @@ from itertools import pairwise
 from usdhand.anatomy import Hands, Side
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
+from usdhand.problems import Problem
 from usdhand.splice.locate import RATE, locate
 from usdhand.splice.markers import hand_markers
 from usdhand.splice.settings import Pin
@@ -30,7 +31,7 @@ def length_notes(
     band: float,
     fps: float,
     advice: Callable[[], str],
-) -> list[str]:
+) -> list[Problem]:
     """Notes on the lengths of the clips between their ends and pins.
 
     Raises
@@ -49,7 +50,7 @@ def length_notes(
             f"The body lasts {body.duration:.2f} s, the hand clip {hand_clip.duration:.2f} s: too "
             "long to align at once. Give a narrower --band."
         )
-    notes: dict[str, None] = {}
+    notes: dict[Problem, None] = {}
     for own in pins.values():
         start, end = Pin(0.0, 0.0), Pin(body.duration, hand_clip.duration)
         for one, other in pairwise([start, *own, end]):
@@ -67,7 +68,7 @@ def length_notes(
                 note = f"{_sentence(lengths)}, more than a factor of {UNLIKELY_FACTOR:g} apart"
                 if one is start or other is end:
                     note += f". {advice()}"
-                notes[note] = None
+                notes[Problem("unlike-lengths", note)] = None
     return list(notes)
 
 

@@ -12,6 +12,7 @@ from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError, InputError, UsageError
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
+from usdhand.problems import Problem
 from usdhand.progress import Progress, Steps
 from usdhand.splice.band import (
     Band,
@@ -88,7 +89,7 @@ class Alignment:
         "name": spliced.clip.name,
         "frames": len(spliced.clip),
         "hands": tuple(spliced.hands),
-        "notes": spliced.notes,
+        "problems": len(spliced.problems),
     }
 )
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,7 @@ class Spliced:
 
     clip: Clip
     hands: Mapping[Side, Alignment]
-    notes: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
     settings: SpliceSettings = field(default_factory=SpliceSettings)
 
 
@@ -149,7 +150,7 @@ def splice(
     for pin in settings.pins:
         if pin.side is not None and pin.side not in sides:
             raise UsageError(f"Pin {pin} is for the {pin.side} hand, which is not spliced.")
-    notes = length_notes(
+    problems = length_notes(
         body,
         hand_clip,
         pins,
@@ -158,7 +159,7 @@ def splice(
         lambda: pin_advice(body, hand_clip, body_hands, hand_hands, sides),
     )
     found, more = _aligned_hands(body, hand_clip, body_hands, hand_hands, settings, pins, progress)
-    notes += more + still_finger_notes(body, hand_clip, body_hands, hand_hands, sides)
+    problems += more + still_finger_notes(body, hand_clip, body_hands, hand_hands, sides)
     clip, hands = body, {}
     for side, alignment in found.items():
         warp = alignment.warp[:, 1]
@@ -168,8 +169,8 @@ def splice(
         frames, other = body_hands.frames[side], hand_hands.frames[side]
         clip, names = with_fingers(clip, hand_clip, frames, other, warp, exact)
         hands[side] = replace(alignment, channels=names)
-    notes += held_pose_notes(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
-    return Spliced(clip, hands, tuple(notes), settings)
+    problems += held_pose_notes(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
+    return Spliced(clip, hands, tuple(problems), settings)
 
 
 def align(
@@ -258,7 +259,7 @@ def _aligned_hands(
     settings: SpliceSettings,
     pins: Mapping[Side, tuple[Pin, ...]],
     progress: Progress | None,
-) -> tuple[dict[Side, Alignment], list[str]]:
+) -> tuple[dict[Side, Alignment], list[Problem]]:
     """Alignments of the hands that move; hands that hardly do follow the other one."""
     times = np.arange(len(body)) / body.fps
     markers = {
@@ -279,7 +280,7 @@ def _aligned_hands(
         for side, own in pins.items()
         if side not in still
     }
-    notes = []
+    problems: list[Problem] = []
     if not found:
         ends = body.duration, hand_clip.duration
         found = {
@@ -288,7 +289,8 @@ def _aligned_hands(
             if _pins_fix_both_ends(p, *ends)
         }
         if found:
-            notes.append("no hand moves: the timing is that of the pins, and even between them")
+            message = "no hand moves: the timing is that of the pins, and even between them"
+            problems.append(Problem("pins-only", message))
     if not found:
         clips = {f"the body {body.name}": 0, f"the hand clip {hand_clip.name}": 1}
         at_rest = [
@@ -310,10 +312,11 @@ def _aligned_hands(
             _wrist_range(m, settings.smoothing) < enough for m in markers[side]
         )
         where = "the hand clip" if not body_rests else "both clips" if hand_rests else "the body"
-        notes.append(
+        message = (
             f"the {side} hand hardly moves in {where}: it follows the timing of the {moving} one"
         )
-    return {side: found[side] for side in pins}, notes
+        problems.append(Problem("follows-other-hand", message))
+    return {side: found[side] for side in pins}, problems
 
 
 def _aligned(

@@ -175,8 +175,7 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
         conventions=conventions,
         progress=journal.progress("splicing"),
     )
-    for note in spliced.notes:
-        journal.warn("splice", note, f"{body} with {hands}")
+    journal.about(f"{body} with {hands}", spliced.problems, "warning")
     if not request.dry_run:
         lost = write_spliced(
             spliced,
