@@ -50,13 +50,30 @@ class VerbGroup(click.Group):
         except KeyboardInterrupt:
             click.echo("Interrupted.", err=True)
             ctx.exit(130)
+        except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
+            raise  # click's own ways out
+        except Exception as error:
+            if ctx.find_root().params.get("debug"):
+                raise
+            click.echo(unforeseen(error), err=True)
+            ctx.exit(1)
+
+
+def unforeseen(error: Exception) -> str:
+    """One line for an error that nobody expected: its kind and the start of what it says."""
+    said = " ".join(str(error).split()).encode("utf-8", "backslashreplace").decode()[:200]
+    name = type(error).__name__
+    what = f"{name}: {said}" if said else name
+    return f"Error: an error that usdhand did not expect ({what}); usdhand --debug shows where"
 
 
 @click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="usdhand")
-def main() -> None:
+@click.option("--debug", is_flag=True, help="Show the traceback of an unexpected error.")
+def main(debug: bool) -> None:
     """Hands for digital characters, over OpenUSD.
 
     Exit codes: 0 ok, 1 failed or a check failed, 2 usage, 3 unreadable or unsupported input,
     4 no hand or an ambiguous one, 5 a quality limit was not met, 130 interrupted.
     """
+    del debug  # read by VerbGroup.invoke
