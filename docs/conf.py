@@ -28,3 +28,6 @@ def _escaped(_app: Any, _context: Any, lines: list[str]) -> None:
 def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.connect("sphinx-click-process-description", _escaped)
+
+# Fields of different types share names; a name in a docstring that several have leads to none.
+suppress_warnings = ["ref.python"]
