@@ -13,8 +13,9 @@ exclude_patterns = ["README.md"]
 html_theme = "furo"
 html_title = "usdhand"
 myst_heading_anchors = 3
-# Pages link to source files and samples as they lie in the repository.
-suppress_warnings = ["myst.xref_missing"]
+# Pages link to source files and samples as they lie in the repository. Fields of different types
+# share names; a name in a docstring that several have leads to none.
+suppress_warnings = ["myst.xref_missing", "ref.python"]
 linkcheck_ignore = [r"http://localhost"]
 autodoc_typehints = "description"
 autodoc_member_order = "groupwise"
@@ -25,9 +26,15 @@ def _escaped(_app: Any, _context: Any, lines: list[str]) -> None:
     lines[:] = [line.replace("*", r"\*") for line in lines]
 
 
+def _help_escaped(
+    _app: Any, _what: str, name: str, _value: Any, _options: Any, lines: list[str]
+) -> None:
+    """The docstrings of requests are help texts as well."""
+    if name.endswith("Request"):
+        _escaped(_app, None, lines)
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx."""
+    app.connect("autodoc-process-docstring", _help_escaped)
     app.connect("sphinx-click-process-description", _escaped)
-
-# Fields of different types share names; a name in a docstring that several have leads to none.
-suppress_warnings = ["ref.python"]
