@@ -15,14 +15,14 @@ from usdhand.errors import OutputError
 
 
 def check_output(
-    output: Path, inputs: Iterable[Path], force: bool, suffixes: Iterable[str]
+    output: Path, inputs: Iterable[str | Path], force: bool, suffixes: Iterable[str]
 ) -> None:
     """Refuse an output before any work is done; see `check_outputs`."""
     check_outputs([output], inputs, force, suffixes)
 
 
 def check_outputs(
-    outputs: Sequence[Path], inputs: Iterable[Path], force: bool, suffixes: Iterable[str]
+    outputs: Sequence[Path], inputs: Iterable[str | Path], force: bool, suffixes: Iterable[str]
 ) -> None:
     """Refuse outputs before any work is done.
 
@@ -53,10 +53,10 @@ def check_outputs(
         _check_writable(folder)
 
 
-def _identity(path: Path) -> tuple[int, int] | None:
+def _identity(path: str | Path) -> tuple[int, int] | None:
     """What tells a file from others, whatever its path; None for what is not there."""
     try:
-        found = path.stat()
+        found = os.stat(path)  # noqa: PTH116  (texts too)
     except (OSError, ValueError):
         return None
     return found.st_dev, found.st_ino

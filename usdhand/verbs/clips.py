@@ -13,7 +13,7 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.convert import write_made
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip, Problem
-from usdhand.rigs import Conventions, load_conventions, map_character
+from usdhand.rigs import Conventions, map_character
 
 
 def find_hands(
@@ -46,11 +46,6 @@ def find_hands(
         raise HandNotFoundError(f"{name}: {error}") from error
 
 
-def conventions_from(files: Sequence[Path]) -> Conventions | None:
-    """Return the built-in conventions with a user's files on top, None without any."""
-    return load_conventions(*files) if files else None
-
-
 def write_clip(
     clip: Clip,
     output: str | Path,
@@ -58,7 +53,7 @@ def write_clip(
     flatten: bool = False,
     force: bool = False,
     conventions: Conventions | None = None,
-    inputs: Sequence[Path] = (),
+    inputs: Sequence[str | Path] = (),
 ) -> tuple[Problem, ...]:
     """Write a clip's hands as a layer over the file it was read from; the body stays as it is.
 

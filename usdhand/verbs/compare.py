@@ -10,8 +10,8 @@ from usdhand.formats.files import read_clip
 from usdhand.motion import Clip
 from usdhand.report.compare import compare_result, summary
 from usdhand.requests.compare import CompareRequest
-from usdhand.rigs import Conventions
-from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.rigs import Conventions, load_conventions
+from usdhand.verbs.clips import find_hands
 from usdhand.verbs.outcome import Journal, Outcome
 
 
@@ -30,7 +30,7 @@ def compare(
 
 def run(request: CompareRequest, journal: Journal) -> Outcome:
     """Compare two files; exit 5 if they differ by more than ``max_rms``."""
-    conventions = conventions_from(request.maps)
+    conventions = load_conventions(*request.maps)
     a, b = read_clip(request.a, request.skel), read_clip(request.b, request.skel_b or request.skel)
     for clip in (a, b):
         journal.about(clip.origin.path, clip.problems)

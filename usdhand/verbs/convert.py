@@ -43,8 +43,8 @@ from usdhand.motion.editing import (
 from usdhand.motion.resample import resample_like
 from usdhand.report.convert import convert_result, summary
 from usdhand.requests.convert import ConvertRequest, Edits
-from usdhand.rigs import Conventions, map_character
-from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.rigs import Conventions, load_conventions, map_character
+from usdhand.verbs.clips import find_hands
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -155,7 +155,7 @@ def edit_frames(clip: Clip, edits: Edits, conventions: Conventions | None = None
 
 def write_new(
     clip: Clip,
-    output: Path,
+    output: str | Path,
     *,
     up: str = "Y",
     animated: bool = True,
@@ -168,6 +168,7 @@ def write_new(
     OutputError
         if the output is refused or cannot be written; nothing is left behind then.
     """
+    output = Path(output)
     suffix = output.suffix.lower()
     check_output(output, [p for p in [clip.origin.path] if p], force, WRITABLE)
     if suffix in USD_SUFFIXES:
@@ -262,7 +263,7 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
     """Convert every file, or every animation of one; of several, bad ones are left out."""
     if request.onto_skel is not None and request.onto is None:
         raise UsageError("--onto-skel chooses a skeleton of --onto CHARACTER, which is not given.")
-    conventions = conventions_from(request.maps)
+    conventions = load_conventions(*request.maps)
     paths = find_files(request.files)
     jobs, code = _jobs(paths, request, journal)
     results: list[dict[str, Any]] = []

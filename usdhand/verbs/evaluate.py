@@ -26,7 +26,7 @@ from usdhand.report.plots import evaluating as plotting
 from usdhand.report.plots.style import check_plots
 from usdhand.requests.evaluate import EvaluateRequest
 from usdhand.requests.fill import PRESETS
-from usdhand.rigs import load_conventions
+from usdhand.rigs import Conventions, load_conventions
 from usdhand.verbs.clips import find_hands
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
@@ -34,11 +34,11 @@ from usdhand.verbs.outcome import Journal, Outcome
 
 def measure_library(
     library: MotionLibrary,
-    folder: Path,
-    settings: FillSettings,
+    folder: str | Path,
+    settings: FillSettings | None = None,
     *,
     takes: Sequence[Clip] | None = None,
-    maps: Sequence[Path] = (),
+    conventions: Conventions | None = None,
     progress: Progress | None = None,
 ) -> tuple[list[HandError], list[Problem]]:
     """Fill every clip of a library from the others and compare with its true fingers.
@@ -52,8 +52,13 @@ def measure_library(
     Returns
     -------
     errors, and the clips that could not be filled, or have still fingers, with the reason
+
+    Raises
+    ------
+    CancelledError
+        if ``progress`` returned False.
     """
-    conventions = load_conventions(*maps)
+    settings = settings or FillSettings()
     sources: list[Clip | LibraryClip] = list(library.clips if takes is None else takes)
     spaces: dict[Part, SearchSpace] = {
         (side,): space_for(library, (side,), settings)
@@ -93,8 +98,8 @@ def measure_library(
     return errors, left
 
 
-def _library_source(clip: LibraryClip, folder: Path) -> Clip:
-    return read_clip(folder / clip.path, clip.skel or None)
+def _library_source(clip: LibraryClip, folder: str | Path) -> Clip:
+    return read_clip(Path(folder, clip.path), clip.skel or None)
 
 
 def run(request: EvaluateRequest, journal: Journal) -> Outcome:
@@ -119,7 +124,7 @@ def run(request: EvaluateRequest, journal: Journal) -> Outcome:
             request.library.absolute().parent,
             settings,
             takes=takes,
-            maps=request.maps,
+            conventions=load_conventions(*request.maps),
             progress=journal.progress("evaluating"),
         )
         left_out = [*unread, *left]

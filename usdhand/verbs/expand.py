@@ -14,8 +14,8 @@ from usdhand.motion.resample import resample_like
 from usdhand.reduce.method import expand as expand_channels
 from usdhand.report.expand import expand_result, summary
 from usdhand.requests.expand import ExpandRequest
-from usdhand.rigs import Conventions
-from usdhand.verbs.clips import conventions_from, find_hands, write_clip
+from usdhand.rigs import Conventions, load_conventions
+from usdhand.verbs.clips import find_hands, write_clip
 from usdhand.verbs.outcome import Journal, Outcome
 
 
@@ -25,19 +25,42 @@ def expand(
     """Motion of a rig file: dependent channels computed from its free ones.
 
     ``skel`` chooses a rig by its skeleton where the file has several.
+
+    Raises
+    ------
+    InputError
+        if the file cannot be read, or holds no rig that fits together.
+    UsageError
+        if it has several rigs and none is chosen.
+    HandNotFoundError
+        if its character has no hands.
     """
     return _expanded(usd_rig.read_stored_rig(path, skel), conventions)
 
 
 def expand_onto(
     path: str | Path,
-    target: str | Path,
+    target: Clip | str | Path,
     skel: str | None = None,
     conventions: Conventions | None = None,
 ) -> Clip:
     """Motion of a rig file's hands on another character, in the rig's time.
 
     The body keeps the target's own motion, its ends held, or its bind pose where it has none.
+
+    Parameters
+    ----------
+    target : a clip, or a file of any format; ``skel`` chooses its skeleton
+
+    Raises
+    ------
+    InputError
+        if a file cannot be read, or holds no rig.
+    UsageError
+        if there are several rigs or skeletons and none is chosen, or the target's hands have no
+        channel of the rig.
+    HandNotFoundError
+        if the target has no hands.
     """
     return _expanded_onto(usd_rig.read_stored_rig(path), target, skel, conventions)
 
@@ -45,7 +68,7 @@ def expand_onto(
 def run(request: ExpandRequest, journal: Journal) -> Outcome:
     """Bake a rig's motion over its own input, or over another character."""
     rig, onto, skel = request.rig, request.onto, request.skel
-    conventions = conventions_from(request.maps)
+    conventions = load_conventions(*request.maps)
     inputs = [rig] if onto is None else [rig, onto]
     check_output(request.output, inputs, request.force, USD_SUFFIXES)
     stored = usd_rig.read_stored_rig(rig, skel if onto is None else None)
@@ -79,8 +102,11 @@ def _expanded(stored: usd_rig.StoredRig, conventions: Conventions | None) -> Cli
 
 
 def _expanded_onto(
-    stored: usd_rig.StoredRig, target: str | Path, skel: str | None, conventions: Conventions | None
+    stored: usd_rig.StoredRig,
+    target: Clip | str | Path,
+    skel: str | None,
+    conventions: Conventions | None,
 ) -> Clip:
-    body, _ = read_any(target, skel)
+    body = target if isinstance(target, Clip) else read_any(target, skel)[0]
     body = resample_like(body, stored.clip)
     return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))

@@ -29,8 +29,8 @@ from usdhand.report.plots import filling as plotting
 from usdhand.report.plots.style import check_plots
 from usdhand.requests.fill import FillRequest
 from usdhand.requests.shared import sides
-from usdhand.rigs import Conventions
-from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.rigs import Conventions, load_conventions
+from usdhand.verbs.clips import find_hands
 from usdhand.verbs.finger_joints import add_fingers, lacks_fingers
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -101,7 +101,7 @@ def write_filled(
     *,
     flatten: bool = False,
     force: bool = False,
-    inputs: Sequence[Path] = (),
+    inputs: Sequence[str | Path] = (),
 ) -> tuple[Problem, ...]:
     """Write a filled body as a layer over its file; alternatives are variants of the animation.
 
@@ -134,7 +134,7 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
     check_output(output, given, request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
-    conventions = conventions_from(request.maps)
+    conventions = load_conventions(*request.maps)
     library = read_library(request.library)
     for entry in library.damaged:
         message = f"{entry.file} of the library cannot be used: {entry.message}"

@@ -9,8 +9,8 @@ from usdhand.errors import HandNotFoundError, UsdHandError
 from usdhand.formats.files import animation_names, read_any, read_character
 from usdhand.report.inspect import inspect_result, summary
 from usdhand.requests.inspect import InspectRequest
-from usdhand.rigs import Conventions
-from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.rigs import Conventions, load_conventions
+from usdhand.verbs.clips import find_hands
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -18,7 +18,7 @@ from usdhand.verbs.outcome import Journal, Outcome
 def run(request: InspectRequest, journal: Journal) -> Outcome:
     """Look into every file; exit 4 if one has no hands, or as the worst of its errors says."""
     paths = find_files(request.files)
-    conventions = conventions_from(request.maps)
+    conventions = load_conventions(*request.maps)
     results: list[dict[str, Any]] = []
     code = 0
     for path in journal.each(paths, "inspecting"):

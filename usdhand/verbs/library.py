@@ -20,7 +20,7 @@ from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.library import is_library, read_library, relative_path, write_library
 from usdhand.problems import Problem
 from usdhand.progress import Progress, each
-from usdhand.rigs import load_conventions
+from usdhand.rigs import Conventions
 from usdhand.verbs.clips import find_hands
 
 
@@ -59,18 +59,18 @@ class _Task:
     label: str
     actor: str
     segmentation: Segmentation
-    maps: tuple[Path, ...]
+    conventions: Conventions | None
 
 
 def build_library(
-    paths: Sequence[Path],
-    output: Path,
+    paths: Sequence[str | Path],
+    output: str | Path,
     *,
     segmentation: Segmentation | None = None,
     labels: Mapping[str, tuple[str, str]] | None = None,
     previous: MotionLibrary | None = None,
     rebuild: bool = False,
-    maps: Sequence[Path] = (),
+    conventions: Conventions | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
     keep: float = 10.0,
@@ -93,9 +93,14 @@ def build_library(
 
     Raises
     ------
+    UsageError
+        if a clip is given twice.
     InputError
         if no clip can be used.
+    CancelledError
+        if ``progress`` returned False.
     """
+    files, output = [Path(path) for path in paths], Path(output)
     cutting = segmentation or Segmentation()
     kept = _kept_file(output)
     known = _known([None if rebuild else previous, _read_kept(kept)])
@@ -103,9 +108,9 @@ def build_library(
     clips: list[LibraryClip] = []
     left: list[Problem] = []
     used: set[str] = set()
-    contents = [file_hash(path) for path in paths]
+    contents = [file_hash(path) for path in files]
     before = _Before.of(previous, contents)
-    for path, name, content in zip(paths, _unique_names(paths), contents, strict=True):
+    for path, name, content in zip(files, _unique_names(files), contents, strict=True):
         relative = relative_path(path, output)
         if content is None:
             left.append(Problem("left-out", "no such file", file=relative))
@@ -115,7 +120,7 @@ def build_library(
         used.add(row)
         label, actor = _words(path, (labels or {}).get(row), before.find(content, relative) or old)
         if old is None:
-            task = _Task(path, name, relative, content, label, actor, cutting, tuple(maps))
+            task = _Task(path, name, relative, content, label, actor, cutting, conventions)
             tasks.append(task)
             continue
         old = replace(old, name=name, path=relative, label=label, actor=actor)
@@ -138,7 +143,7 @@ def build_library(
     ordered = tuple(sorted(clips, key=lambda c: c.name))
     library = MotionLibrary(ordered, cutting, tuple(sorted(left, key=lambda entry: entry.file)))
     unmatched = tuple(file for file in labels or {} if file not in used)
-    here = {*contents, *(relative_path(path, output) for path in paths)}
+    here = {*contents, *(relative_path(path, output) for path in files)}
     removed = tuple(
         clip
         for clip in (previous.clips if previous else ())
@@ -271,10 +276,9 @@ def _read(task: _Task) -> LibraryClip | Problem:
         clip = read_clip(task.path)
         if len(clip) < 2:
             return Problem("left-out", "it is a single frame", file=task.relative)
-        conventions = load_conventions(*task.maps) if task.maps else None
         made = library_clip(
             clip,
-            find_hands(clip, conventions),
+            find_hands(clip, task.conventions),
             task.segmentation,
             path=task.relative,
             content_hash=task.content_hash,

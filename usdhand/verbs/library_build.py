@@ -24,6 +24,7 @@ from usdhand.formats.usd.library import is_library, read_library, write_library
 from usdhand.problems import counted, listed
 from usdhand.report.library import library_result, summary
 from usdhand.requests.library import LibraryBuildRequest
+from usdhand.rigs import load_conventions
 from usdhand.verbs.files import find_files_below
 from usdhand.verbs.library import (
     BuildResult,
@@ -45,6 +46,7 @@ def run(request: LibraryBuildRequest, journal: Journal) -> Outcome:
     check_output(output, paths, True, OUTPUTS)
     previous = _previous(request, journal)
     labels = _read_labels(request.labels) if request.labels else None
+    conventions = load_conventions(*request.maps) if request.maps else None
     try:
         with _terminated_as_interrupted():
             built = build_library(
@@ -54,7 +56,7 @@ def run(request: LibraryBuildRequest, journal: Journal) -> Outcome:
                 labels=labels,
                 previous=previous,
                 rebuild=request.rebuild,
-                maps=request.maps,
+                conventions=conventions,
                 jobs=request.jobs,
                 progress=journal.progress("reading"),
             )

@@ -29,8 +29,8 @@ from usdhand.report.preview.pack import Pack
 from usdhand.report.preview.page import figure, page
 from usdhand.report.preview.summary import preview_result, summary
 from usdhand.requests.preview import PreviewRequest, PreviewSettings
-from usdhand.rigs import Conventions
-from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.rigs import Conventions, load_conventions
+from usdhand.verbs.clips import find_hands
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -56,7 +56,7 @@ class Previewed:
 
 
 def preview_clips(
-    files: Sequence[str | Path],
+    clips: Sequence[Clip | str | Path],
     settings: PreviewSettings | None = None,
     *,
     skel: str | None = None,
@@ -69,6 +69,8 @@ def preview_clips(
 
     Parameters
     ----------
+    clips : clips, or files of any format, with their meshes where these are USD
+    skel : path or name of the skeleton of files with several
     reports : JSON reports of `fill` or `splice`, for the timeline, of files that are shown; with
         that of a splice, its hand clip plays in the time of the body
     figures : SVG or PNG files to show below
@@ -78,18 +80,18 @@ def preview_clips(
     InputError
         if a file cannot be used.
     UsageError
-        if a report tells of none of the files.
+        if there is nothing to show, or a report tells of none of the files.
     """
-    if not files:
+    if not clips:
         raise UsageError("There is nothing to show: give a file.")
     settings = settings or PreviewSettings()
     read = [(Path(path), read_report(Path(path))) for path in reports]
     pictures = [figure(Path(path)) for path in figures]
-    names = _names([Path(f) for f in files])
+    names = _names([c if isinstance(c, Clip) else Path(c) for c in clips])
     lanes = [
         lane
-        for path, name in names.items()
-        for lane in _lanes(path, name, skel, settings, conventions)
+        for source, name in names.items()
+        for lane in _lanes(source, name, skel, settings, conventions)
     ]
     rows = [row for path, report in read for row in _report_rows(report, path, lanes)]
     lanes = _retimed(lanes, dict(retiming(report) for _, report in read))
@@ -105,7 +107,11 @@ def preview_clips(
 
 
 def write_preview(
-    previewed: Previewed, output: str | Path, *, force: bool = False, inputs: Sequence[Path] = ()
+    previewed: Previewed,
+    output: str | Path,
+    *,
+    force: bool = False,
+    inputs: Sequence[str | Path] = (),
 ) -> None:
     """Write a page.
 
@@ -121,22 +127,23 @@ def write_preview(
 
 
 def _lanes(
-    path: Path,
+    source: Clip | Path,
     name: str,
     skel: str | None,
     settings: PreviewSettings,
     conventions: Conventions | None,
 ) -> list[Lane]:
-    if is_usd(path):
-        takes = read_shown(path, skel, skins=settings.max_points > 0)
+    if isinstance(source, Clip):
+        takes = [ShownMotion(source)]
+    elif is_usd(source):
+        takes = read_shown(source, skel, skins=settings.max_points > 0)
     else:
-        takes = [ShownMotion(read_any(path, skel)[0])]
-    return [_lane(take, path, name, i == 0, settings, conventions) for i, take in enumerate(takes)]
+        takes = [ShownMotion(read_any(source, skel)[0])]
+    return [_lane(take, name, i == 0, settings, conventions) for i, take in enumerate(takes)]
 
 
 def _lane(
     take: ShownMotion,
-    path: Path,
     name: str,
     first: bool,
     settings: PreviewSettings,
@@ -148,7 +155,8 @@ def _lane(
         notes += hands.notes
     except HandNotFoundError as error:
         hands = None
-        notes.append(f"no close-ups and curves: {str(error).removeprefix(f'{path}: ')}")
+        whose = f"{take.clip.origin.path or take.clip.name}: "
+        notes.append(f"no close-ups and curves: {str(error).removeprefix(whose)}")
     skins = take.skins
     if word := unshown(skins, settings.max_points):
         skins = ()
@@ -209,8 +217,9 @@ def _title(names: Sequence[str]) -> str:
     return f"{', '.join(names[:2])} and {len(names) - 2} more"
 
 
-def _names(files: Sequence[Path]) -> dict[Path, str]:
-    """Names of lanes: the files' own, with as many folders as tell them apart."""
+def _names(sources: Sequence[Clip | Path]) -> dict[Clip | Path, str]:
+    """Names of lanes: the files' own, with as many folders as tell them apart; those of clips."""
+    files = [source for source in sources if isinstance(source, Path)]
 
     def name(file: Path) -> str:
         parts = file.absolute().with_suffix("").parts
@@ -220,7 +229,14 @@ def _names(files: Sequence[Path]) -> dict[Path, str]:
                 return "/".join(own)
         return file.name
 
-    return {file: name(file) for file in files}
+    names: dict[Clip | Path, str] = {file: name(file) for file in files}
+    for clip in (source for source in sources if isinstance(source, Clip)):
+        own, number = clip.name or "clip", 1
+        while own in names.values():
+            number += 1
+            own = f"{clip.name or 'clip'} {number}"
+        names[clip] = own
+    return {source: names[source] for source in sources}
 
 
 def run(request: PreviewRequest, journal: Journal) -> Outcome:
@@ -235,7 +251,7 @@ def run(request: PreviewRequest, journal: Journal) -> Outcome:
         reports=request.reports,
         figures=request.figures,
         title=request.title,
-        conventions=conventions_from(request.maps),
+        conventions=load_conventions(*request.maps),
     )
     for note in previewed.notes:
         journal.warn("preview", note)

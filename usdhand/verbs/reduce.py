@@ -24,8 +24,8 @@ from usdhand.report.plots.style import check_plots
 from usdhand.report.reduce import reduce_result, summary
 from usdhand.requests.reduce import ReduceRequest
 from usdhand.requests.shared import sides
-from usdhand.rigs import Conventions
-from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.rigs import Conventions, load_conventions
+from usdhand.verbs.clips import find_hands
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -124,7 +124,7 @@ def run(request: ReduceRequest, journal: Journal) -> Outcome:
     _check_outputs(outputs, inputs, request.force)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
-    conventions = conventions_from(request.maps)
+    conventions = load_conventions(*request.maps)
     rig = read_rig(request.rig) if request.rig else None
     clips = [read_clip(path, request.skel) for path in journal.each(paths, "reading")]
     for clip in clips:

@@ -25,10 +25,10 @@ from usdhand.report.plots.style import check_plots
 from usdhand.report.splice import splice_result, summary
 from usdhand.requests.shared import sides
 from usdhand.requests.splice import SpliceRequest
-from usdhand.rigs import Conventions
+from usdhand.rigs import Conventions, load_conventions
 from usdhand.splice.method import Spliced, splice
 from usdhand.splice.settings import Pin, SpliceSettings
-from usdhand.verbs.clips import conventions_from, find_hands
+from usdhand.verbs.clips import find_hands
 from usdhand.verbs.outcome import Journal, Outcome
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def write_spliced(
     flatten: bool = False,
     force: bool = False,
     conventions: Conventions | None = None,
-    inputs: Sequence[Path] = (),
+    inputs: Sequence[str | Path] = (),
 ) -> tuple[Problem, ...]:
     """Write a spliced body as a layer over its file, with the warps as attributes of a Scope.
 
@@ -156,7 +156,7 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
     check_output(output, [body, hands], request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
-    conventions = conventions_from(request.maps)
+    conventions = load_conventions(*request.maps)
     clip = read_clip(body, request.skel)
     try:
         hand_clip = read_clip(hands, request.hands_skel)

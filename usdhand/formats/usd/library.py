@@ -43,7 +43,7 @@ LEFT_OUT = f"{ROOT}/LeftOut"
 _TYPES = Sdf.ValueTypeNames
 
 
-def write_library(library: MotionLibrary, output: Path, *, force: bool = False) -> None:
+def write_library(library: MotionLibrary, output: str | Path, *, force: bool = False) -> None:
     """Write a library; clip paths must be relative to the output's folder, or absolute.
 
     Raises
@@ -51,6 +51,7 @@ def write_library(library: MotionLibrary, output: Path, *, force: bool = False) 
     OutputError
         if the output is refused or cannot be written.
     """
+    output = Path(output)
     check_output(output, (), force, [s for s in USD_SUFFIXES if s != ".usdz"])
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     with Sdf.ChangeBlock():

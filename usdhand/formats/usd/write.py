@@ -62,7 +62,7 @@ def write_motion(
     *,
     flatten: bool = False,
     force: bool = False,
-    inputs: Sequence[Path] = (),
+    inputs: Sequence[str | Path] = (),
     variants: Mapping[str, Clip] | None = None,
     author: Callable[[Sdf.Layer, Sdf.Path], None] | None = None,
 ) -> tuple[Problem, ...]:
