@@ -19,8 +19,9 @@ from usdhand.formats.bvh.motion import from_euler
 from usdhand.formats.bvh.read import read_character, read_clip
 from usdhand.formats.bvh.write import write_clip
 from usdhand.formats.reading import Reading
-from usdhand.motion import Clip, Problem, Skeleton, forward_kinematics, parents_from_paths
+from usdhand.motion import Clip, Skeleton, forward_kinematics, parents_from_paths
 from usdhand.motion import rotations as rot
+from usdhand.problems import Problem
 from usdhand.rigs import map_character
 
 NEAR_CM, NEAR_DEG = 0.01, 0.01

@@ -15,9 +15,10 @@ from scipy.spatial.transform import Rotation, Slerp
 from usdhand.errors import UsageError
 from usdhand.motion import Clip, Skeleton, forward_kinematics, parents_from_paths, resample
 from usdhand.motion import rotations as rot
-from usdhand.motion.clip import Origin, Problem
+from usdhand.motion.clip import Origin
 from usdhand.motion.kinematics import scaled_joints
 from usdhand.motion.resample import interpolate, interpolate_rotations
+from usdhand.problems import Problem
 
 
 def clip_of(joints: tuple[str, ...] = stages.JOINTS, frames: int = 9, scale: float = 0.0) -> Clip:

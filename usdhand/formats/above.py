@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import FLAT
+from usdhand.problems import Problem
 
 UNEVEN = 0.01  # relative difference of scales
 

@@ -14,7 +14,8 @@ from usdhand.formats.suffixes import FORMATS, READABLE, USD_SUFFIXES
 from usdhand.formats.usd import read as usd
 from usdhand.formats.usd.character import legal_clip
 from usdhand.formats.usd.stage import find_character
-from usdhand.motion import Clip, Problem
+from usdhand.motion import Clip
+from usdhand.problems import Problem
 
 
 def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFAULT) -> Clip:

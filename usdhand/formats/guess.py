@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
+from usdhand.problems import Problem
 
 FOOT = re.compile(r"foot|ankle|toe", re.IGNORECASE)
 HEAD = re.compile(r"head", re.IGNORECASE)

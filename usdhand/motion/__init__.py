@@ -4,13 +4,11 @@ from usdhand.motion.clip import Clip, Origin
 from usdhand.motion.kinematics import Pose, forward_kinematics
 from usdhand.motion.resample import resample
 from usdhand.motion.skeleton import Skeleton, leaf_name, parents_from_paths
-from usdhand.problems import Problem
 
 __all__ = [
     "Clip",
     "Origin",
     "Pose",
-    "Problem",
     "Skeleton",
     "forward_kinematics",
     "leaf_name",

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from usdhand.errors import HandNotFoundError
-from usdhand.motion import Clip, Problem
+from usdhand.motion import Clip
+from usdhand.problems import Problem
 from usdhand.report.document import rounded
 from usdhand.report.text import problems_data, written_to
 from usdhand.rigs import Conventions, map_character

@@ -12,7 +12,8 @@ from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.convert import write_made
 from usdhand.formats.usd.write import write_motion
-from usdhand.motion import Clip, Problem
+from usdhand.motion import Clip
+from usdhand.problems import Problem
 from usdhand.rigs import Conventions, map_character
 
 

@@ -31,7 +31,7 @@ from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES, WRITABLE
 from usdhand.formats.usd.convert import StageEdit, placed, write_made, write_placed
-from usdhand.motion import Clip, Problem, resample
+from usdhand.motion import Clip, resample
 from usdhand.motion.editing import (
     counted_in_frames,
     in_place,
@@ -41,6 +41,7 @@ from usdhand.motion.editing import (
     trim,
 )
 from usdhand.motion.resample import resample_like
+from usdhand.problems import Problem
 from usdhand.report.convert import convert_result, summary
 from usdhand.requests.convert import ConvertRequest, Edits
 from usdhand.rigs import Conventions, load_conventions, map_character

@@ -15,7 +15,8 @@ from usdhand.formats.output import check_folder, check_outputs, make_folder
 from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
-from usdhand.motion import Clip, Problem
+from usdhand.motion import Clip
+from usdhand.problems import Problem
 from usdhand.reduce.method import Reduction, apply_rig, fit_rig
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.settings import Fit, ReduceSettings

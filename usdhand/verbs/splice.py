@@ -18,7 +18,8 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.warp import author_warps
 from usdhand.formats.usd.write import write_motion
-from usdhand.motion import Clip, Problem
+from usdhand.motion import Clip
+from usdhand.problems import Problem
 from usdhand.progress import Progress
 from usdhand.report.plots import splicing as plotting
 from usdhand.report.plots.style import check_plots

@@ -12,9 +12,9 @@ from typing import NoReturn
 from usdhand.errors import InputError
 from usdhand.formats.bvh.hierarchy import Hierarchy, line_at, parse_hierarchy
 from usdhand.formats.bvh.numbers import RowError, compiled_rows, plain_rows
-from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS, rate_of_frame_time
+from usdhand.problems import Problem
 
 # Bytes from which the compiled parser is used: loading it first takes a second.
 LARGE, LARGE_ONCE_LOADED = 40_000_000, 4_000_000

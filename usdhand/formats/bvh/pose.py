@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.formats.guess import FOOT, HEAD, bone_ways
-from usdhand.motion import Clip, Problem, Skeleton, forward_kinematics
+from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import compose_trs
+from usdhand.problems import Problem
 
 # A body stands if head and feet are at least so much of the length of the bones between them and
 # the hips above and below these. Rest poses of real files have 0.85 and more, or about nothing.

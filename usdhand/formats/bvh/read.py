@@ -15,9 +15,10 @@ from usdhand.formats.bvh.motion import local_motion
 from usdhand.formats.bvh.pose import choose_bind, posed_skeleton
 from usdhand.formats.guess import guess_units, guess_up
 from usdhand.formats.reading import DEFAULT, Reading
-from usdhand.motion import Clip, Origin, Problem, forward_kinematics
+from usdhand.motion import Clip, Origin, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import IDENTITY, Y_UP_FROM_Z_UP, Array
+from usdhand.problems import Problem
 
 LOOKED_AT = 40  # frames that the up axis is guessed from
 # Joints times frames that need as much memory as any motion; more only if most joints move.

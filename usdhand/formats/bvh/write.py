@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.formats.bvh.euler import zxy_angles
-from usdhand.motion import Clip, Pose, Problem, Skeleton, forward_kinematics
+from usdhand.motion import Clip, Pose, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.kinematics import scaled_joints
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import to_y_up
+from usdhand.problems import Problem
 
 MOVES_CM = 5e-4  # a joint that is farther from its place at the bind pose gets position channels
 TURNS_DEG = 1e-3  # an end that turns more is a joint

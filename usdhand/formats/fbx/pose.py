@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from usdhand.formats.fbx.scene import Scene, Transforms
-from usdhand.motion import Problem
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import (
@@ -19,6 +18,7 @@ from usdhand.motion.transforms import (
     orientation,
     with_even_signs,
 )
+from usdhand.problems import Problem
 
 SAME_SCALE = 1e-5  # scales this close to one are rounding
 SHEAR = 1e-3  # of a joint's axes, that no scale of joints can represent

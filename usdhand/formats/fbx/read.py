@@ -11,10 +11,11 @@ from usdhand.formats.fbx.pose import bind_matrices, joint_locals, right_handed
 from usdhand.formats.fbx.scene import Sampled, Scene, load_scene
 from usdhand.formats.fbx.skeletons import FbxSkeleton, find_skeleton, find_take, keyed_takes
 from usdhand.formats.reading import DEFAULT, Reading
-from usdhand.motion import Clip, Origin, Problem, Skeleton, parents_from_paths
+from usdhand.motion import Clip, Origin, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.timing import DEFAULT_FPS
 from usdhand.motion.transforms import compose_trs, to_y_up
+from usdhand.problems import Problem
 
 
 def read_clip(path: Path, reading: Reading = DEFAULT) -> Clip:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.fbx.scene import Sampled, Scene
 from usdhand.formats.suffixes import CHOOSE_ANIMATION
-from usdhand.motion import Problem
+from usdhand.problems import Problem
 
 LIMBS = 3  # joints that a chain needs to be a limb
 

@@ -13,9 +13,9 @@ from usdhand.formats.gltf.accessors import read_rows
 from usdhand.formats.gltf.document import Document, Element, listed, unused
 from usdhand.formats.gltf.nodes import SHORTEST
 from usdhand.formats.suffixes import CHOOSE_ANIMATION
-from usdhand.motion import Problem
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.problems import Problem
 
 KINDS = {"rotation": "VEC4", "translation": "VEC3", "scale": "VEC3"}
 LEAST_NUMBERS = 1_000_000  # that any file may hold: sparse accessors need no bytes

@@ -11,11 +11,11 @@ from usdhand.formats.above import scale_problems
 from usdhand.formats.gltf.curves import Curves, evaluate
 from usdhand.formats.gltf.document import LARGEST
 from usdhand.formats.gltf.nodes import Tree
-from usdhand.motion import Problem
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import Timing
 from usdhand.motion.transforms import compose_trs, mean_scale, nearest_rotation, with_even_signs
+from usdhand.problems import Problem
 
 UNEVEN_SCALE = 2e-6  # relative: what rounding leaves of scales that are meant to be even
 

@@ -9,9 +9,9 @@ from usdhand.formats.gltf.accessors import read_rows
 from usdhand.formats.gltf.characters import GltfCharacter, GltfSkin
 from usdhand.formats.gltf.document import Document
 from usdhand.formats.gltf.nodes import Tree
-from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import affine, orientation
+from usdhand.problems import Problem
 
 SAME_LENGTH = 0.05  # relative difference of bones of one skeleton in two poses
 SAME_PLACE = 1e-3  # of the character's size: two skins agree on a joint

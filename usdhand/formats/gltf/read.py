@@ -17,9 +17,10 @@ from usdhand.formats.gltf.placement import Motion, Space, find_placement, placed
 from usdhand.formats.gltf.poses import bind_matrices
 from usdhand.formats.gltf.vrm import Humanoid, read_humanoid
 from usdhand.formats.reading import DEFAULT, Reading
-from usdhand.motion import Clip, Origin, Problem, Skeleton
+from usdhand.motion import Clip, Origin, Skeleton
 from usdhand.motion.timing import DEFAULT_FPS, MOST_FRAMES, Timing, find_timing
 from usdhand.motion.transforms import compose_trs, to_y_up
+from usdhand.problems import Problem
 
 CM_PER_UNIT = 100.0
 MOST_VALUES = 20_000_000  # frames times joints: 55 minutes of 100 joints at 60 fps

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from usdhand.errors import InputError
 from usdhand.formats.gltf.document import BINARY_CHUNK, JSON_CHUNK, MAGIC
-from usdhand.motion import Clip, Problem, Skeleton
+from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import decompose_trs
+from usdhand.problems import Problem
 from usdhand.version import __version__
 
 METRES = 0.01  # of a centimetre

@@ -28,10 +28,11 @@ from usdhand.formats.usd.write import (
     save_layer,
     stage_files,
 )
-from usdhand.motion import Clip, Problem, Skeleton
+from usdhand.motion import Clip, Skeleton
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import recounted_code
 from usdhand.motion.transforms import local_matrices
+from usdhand.problems import Problem
 
 # Problems of a clip whose animation is written again to mend them.
 MENDED = {"missing-translations", "missing-scales"}

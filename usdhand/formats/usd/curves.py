@@ -11,9 +11,9 @@ from pxr import Usd, UsdSkel
 
 from usdhand.errors import InputError
 from usdhand.formats.usd.samples import EVERY, Track, blocks, open_track
-from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import MOST_FRAMES, Clock, Timing, find_timing
+from usdhand.problems import Problem
 
 UNIT_TOLERANCE = 1e-6  # of a squared norm: what rounding to float32 leaves
 SHORTEST = 1e-6  # squared norm below which a quaternion has no direction

@@ -10,9 +10,10 @@ from pxr import UsdSkel
 
 from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import World
-from usdhand.motion import Problem, Skeleton
+from usdhand.motion import Skeleton
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import affine, local_matrices, rigid, unit
+from usdhand.problems import Problem
 
 MISPLACED_BIND_CM = 1.0
 

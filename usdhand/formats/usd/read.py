@@ -25,11 +25,12 @@ from usdhand.formats.usd.poses import AuthoredPoses, authored_poses, placed_skel
 from usdhand.formats.usd.samples import Track, steady
 from usdhand.formats.usd.stage import Character, damage_refused, find_character
 from usdhand.formats.usd.world import World, world_above, world_problems
-from usdhand.motion import Clip, Origin, Problem, parents_from_paths
+from usdhand.motion import Clip, Origin, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS
 from usdhand.motion.transforms import compose_trs, with_even_signs
+from usdhand.problems import Problem
 
 
 def read_clip(path: str | Path, skel: str | None = None) -> Clip:

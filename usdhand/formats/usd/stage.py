@@ -14,7 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.motion import Problem
+from usdhand.problems import Problem
 
 MOST_NAMED = 8  # skeletons in a message
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from pxr import Ar, Sdf, UsdShade, UsdUtils
 
 from usdhand.formats.usd.stage import usd_diagnostics
-from usdhand.motion import Problem
+from usdhand.problems import Problem
 
 
 @dataclass(frozen=True)

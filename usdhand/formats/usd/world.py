@@ -9,9 +9,9 @@ from pxr import Usd, UsdGeom
 
 from usdhand.errors import InputError
 from usdhand.formats.above import scale_problems
-from usdhand.motion import Problem
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import affine, mean_scale, nearest_rotation, to_y_up
+from usdhand.problems import Problem
 
 
 @dataclass(frozen=True, eq=False)

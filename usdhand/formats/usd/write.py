@@ -38,7 +38,8 @@ from usdhand.formats.usd.textures import (
     modify_paths,
     unpacked_beside,
 )
-from usdhand.motion import Clip, Problem
+from usdhand.motion import Clip
+from usdhand.problems import Problem
 
 ANIMATION_NAME = "HandMotion"
 # Fields of a root layer that are about the layer itself; all others describe the stage.
