@@ -106,16 +106,19 @@ def assert_same_points(path: Path, frame: int) -> None:
     assert not notes
     time = float(clip.time_codes[frame])
     world = world_above(character.skeleton, np.array([time]))
-    UsdSkel.BakeSkinning(UsdSkel.Root(character.root))
+    # In a copy: the file's own layer, once changed, would be saved with whatever uses it next.
+    stage = Usd.Stage.Open(character.stage.Flatten())
+    root = stage.GetPrimAtPath(character.root.GetPath())
+    UsdSkel.BakeSkinning(UsdSkel.Root(root))
     for skin, points in zip(skins, skinned(clip, frame, skins), strict=True):
         [mesh] = [
             UsdGeom.Mesh(p)
-            for p in Usd.PrimRange(character.root)
+            for p in Usd.PrimRange(root)
             if p.IsA(UsdGeom.Mesh) and p.GetName() == skin.name
         ]
         baked = np.asarray(mesh.GetPointsAttr().Get(time), float)
         place = np.array(UsdGeom.Xformable(mesh).ComputeLocalToWorldTransform(time))
-        units = 100.0 * UsdGeom.GetStageMetersPerUnit(character.stage)
+        units = 100.0 * UsdGeom.GetStageMetersPerUnit(stage)
         expected = (baked @ place[:3, :3] + place[3, :3]) * units @ world.axes.T
         assert np.abs(points - expected).max() < 0.05, skin.name
 
