@@ -1,4 +1,4 @@
-"""Seconds to read and write a BVH file of 20000 frames and 75 joints, beside published readers.
+"""Seconds to read and write a BVH file of 20000 frames and 75 joints: ours and other readers.
 
     python benchmarks/bvh_speed.py [--peers PYTHON] [--frames 20000] [--repeat 5]
 

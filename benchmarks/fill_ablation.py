@@ -3,7 +3,7 @@
     python benchmarks/fill_ablation.py --data FOLDER [--other FOLDER]
 
 FOLDER holds takes with fingers. Settings are compared on two thirds of them; every third take by
-name is kept aside for the final comparison. Each take is filled from all others. OTHER holds takes
+name is held out for the final comparison. Each take is filled from all others. OTHER holds takes
 of another rig, filled from FOLDER and the reverse.
 """
 
@@ -33,7 +33,7 @@ VARIANTS: tuple[tuple[str, FillSettings], ...] = (
     ("... and costs scaled to the same average", replace(PAPER, metric="arm", scaled=True)),
     ("... and short segments", replace(DEFAULT, pool=0, blend="linear", repeat_weight=0.0)),
     ("... and smooth seams, no piece twice", replace(DEFAULT, pool=0)),
-    ("... and neighbours' say: **the default**", DEFAULT),
+    ("... and agreement of the neighbours: **the default**", DEFAULT),
     ("default, segments as the paper's", replace(DEFAULT, segmentation=PAPER_SEGMENTATION)),
     ("default, Euler metric", replace(DEFAULT, metric="euler")),
     ("default, k = 1", replace(DEFAULT, k=1)),
@@ -57,7 +57,7 @@ def main() -> None:
     tuned = [c for c in clips if c not in held]
     print(f"**Settings**, {len(tuned)} takes, each from the other {len(clips) - 1}.\n")
     table([(name, errors_of(library, arguments.data, tuned, s)) for name, s in VARIANTS], "fill")
-    compare(f"{len(held)} takes kept aside", library, arguments.data, held)
+    compare(f"{len(held)} held-out takes", library, arguments.data, held)
     if arguments.other:
         others = sorted(arguments.other.glob("*.usd*"))
         other = build(others, arguments.other)

@@ -1,8 +1,8 @@
-"""Speed of the exact search beside other warping libraries, as a Markdown table.
+"""Speed of the exact search, compared with other warping libraries, as a Markdown table.
 
     python benchmarks/search_speed.py [--quick] [--folder DIR]
 
-Needs the extra ``bench``: dtaidistance and aeon. Neither offers the type III c warp; they solve
+Needs the extra ``dev`` (dtaidistance and aeon). Neither offers the type III c warp; they solve
 the nearest comparable job, the symmetric warp (any number of stays on either side, no weights) of
 the same queries to the same candidates, with the same local cost. Times are the best of several
 in one run. 1.2 GB of stored library are written to the folder and removed.

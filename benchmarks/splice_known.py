@@ -1,11 +1,11 @@
-"""How exactly splice aligns pairs whose true alignment is known, beside simpler ways.
+"""How exactly splice aligns pairs whose true alignment is known, compared with simpler methods.
 
 Run: python benchmarks/splice_known.py [--takes FOLDER] [--space] [--seed N]
 
 Pairs are made of real takes, see tests/builders/known_pairs.py. Counted are frames of the body at
 which the
 wrist moves, relative to the shoulder, faster than 15 cm/s. Errors are in the body's time: how far
-the moment that is shown is from the one that should be. Every third take was kept aside while
+the moment that is shown is from the one that should be. Every third take was held out while
 settings were chosen. With --space the noise is 3 mm in space instead of 3 mm a coordinate.
 """
 
@@ -44,12 +44,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1000, help="of warps, turns and noise")
     arguments = parser.parse_args()
     noise = NOISE_CM / np.sqrt(3.0) if arguments.space else NOISE_CM
-    errors: dict[str, Row] = {"used for tuning": defaultdict(list), "kept aside": defaultdict(list)}
+    errors: dict[str, Row] = {"used for tuning": defaultdict(list), "held out": defaultdict(list)}
     fingers: dict[str, list[float]] = {name: [] for name in errors}
     pairs = known_pairs(arguments.takes)
     for i, (body, hands) in enumerate(pairs):
         pair = known_pair(body, hands, arguments.seed + i, noise)
-        part = "kept aside" if i % 3 == 2 else "used for tuning"
+        part = "held out" if i % 3 == 2 else "used for tuning"
         spliced = splice(pair.body, pair.hands, pair.body_hands, pair.hand_hands)
         for side, alignment in spliced.hands.items():
             for name, error in pair_errors(pair, side, alignment).items():

@@ -46,7 +46,7 @@ def main() -> None:
     parser.add_argument("--peers", metavar="PYTHON", nargs="+", default=[])
     arguments = parser.parse_args()
     takes = markers_of(arguments.takes)
-    print("frames  seconds  cells of pass 1  ns a cell  peak MB above the clips")
+    print("frames  seconds  cells of pass 1  ns per cell  peak MB in addition to the clips")
     seconds: dict[int, float] = {}
     context = multiprocessing.get_context("spawn")
     for frames in (569, 3000, 36000):
@@ -94,7 +94,7 @@ def peer(package: str, file: Path, interpreters: list[str]) -> str:
             return f"not done after {PEER_SECONDS} s"
         if done.returncode == 0:
             seconds, memory = map(float, done.stdout.split()[-2:])
-            return f"{seconds:.3f} s, {memory:.0f} MB above the clips"
+            return f"{seconds:.3f} s, {memory:.0f} MB in addition to the clips"
         if "MemoryError" in done.stderr:
             return f"out of memory at {PEER_GB} GB"
         if "ModuleNotFoundError" not in done.stderr:

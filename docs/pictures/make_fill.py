@@ -10,7 +10,6 @@ import numpy as np
 from sheet import ROOT, Column, sheet
 
 import usdhand
-from usdhand.verbs import fill as filling
 
 TALKS = ROOT / "samples" / "conversations"
 FRAMES = (235, 330, 405)
@@ -21,10 +20,10 @@ def main() -> None:
     """Build a library, fill, render and plot."""
     folder = Path(tempfile.mkdtemp())
     clips = sorted((ROOT / "samples" / "gestures").glob("*.usdc"))
-    library = filling.build_library(clips, folder / "library.usdc").library
+    library = usdhand.build_library(clips, folder / "library.usdc").library
     body = usdhand.read_clip(TALKS / "talk_01_body.usdc")
-    filled = filling.fill_fingers(body, library)
-    filling.write_filled(filled, folder / "filled.usdc")
+    filled = usdhand.fill_fingers(body, library)
+    usdhand.write_filled(filled, folder / "filled.usdc")
     truth = usdhand.read_clip(TALKS / "talk_01_full.usdc")
     columns = [
         Column("body clip: fingers still", TALKS / "talk_01_body.usdc"),

@@ -16,7 +16,6 @@ from playwright.sync_api import Browser, sync_playwright
 import usdhand
 from usdhand.report.document import document, dumps
 from usdhand.report.fill import fill_result
-from usdhand.verbs import fill as filling
 from usdhand.verbs.preview import preview_clips, write_preview
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,11 +52,11 @@ def main() -> None:
 def make_fill(folder: Path, page: Path) -> None:
     """A page of a filled body beside the true fingers."""
     clips = sorted((SAMPLES / "gestures").glob("*.usdc"))
-    library = filling.build_library(clips, folder / "library.usdc").library
+    library = usdhand.build_library(clips, folder / "library.usdc").library
     taken = SAMPLES / "conversations" / "talk_01_body.usdc"
     body = usdhand.read_clip(taken)
-    filled = filling.fill_fingers(body, library)
-    filling.write_filled(filled, folder / "filled.usdc")
+    filled = usdhand.fill_fingers(body, library)
+    usdhand.write_filled(filled, folder / "filled.usdc")
     report = document("fill", [taken], {}, fill_result(filled, library, body))
     report["output"] = str(folder / "filled.usdc")
     (folder / "fill.json").write_text(dumps(report), encoding="utf-8")

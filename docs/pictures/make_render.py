@@ -22,13 +22,12 @@ SAMPLES = 32
 def main() -> None:
     """Fill, render, compose."""
     import usdhand
-    from usdhand.verbs import fill as filling
 
     folder = Path(tempfile.mkdtemp())
     clips = sorted((ROOT / "samples" / "gestures").glob("*.usdc"))
-    library = filling.build_library(clips, folder / "library.usdc").library
-    filled = filling.fill_fingers(usdhand.read_clip(BODY), library)
-    filling.write_filled(filled, folder / "after.usdc")
+    library = usdhand.build_library(clips, folder / "library.usdc").library
+    filled = usdhand.fill_fingers(usdhand.read_clip(BODY), library)
+    usdhand.write_filled(filled, folder / "after.usdc")
     shots = [
         [str(BODY), str(folder / "before")],
         [str(folder / "after.usdc"), str(folder / "after")],

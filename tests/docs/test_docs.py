@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import re
 import subprocess
@@ -151,3 +152,23 @@ def test_the_picture_of_the_architecture_is_what_its_script_draws(tmp_path: Path
 def test_the_citation_is_of_this_version() -> None:
     citation = (REPOSITORY / "CITATION.cff").read_text(encoding="utf-8")
     assert f"\nversion: {usdhand.__version__}\n" in citation
+
+
+SCRIPTS = [
+    *sorted((REPOSITORY / "docs" / "pictures").glob("*.py")),
+    *sorted((REPOSITORY / "benchmarks").glob("*.py")),
+]
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.name)
+def test_scripts_use_names_that_are_there(script: Path) -> None:
+    """Scripts that make pictures and figures run seldom: see that their imports still work."""
+    tree = ast.parse(script.read_text(encoding="utf-8"))
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("usdhand"):
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) == "usdhand":
+            names.add(f"usdhand.{node.attr}")
+    for name in names:
+        resolved(name)
