@@ -52,6 +52,15 @@ def test_the_reference_names_no_option_that_is_not_there() -> None:
     assert set(re.findall(r"`(--[a-z-]+)", REFERENCE)) <= known
 
 
+def test_environment_variables_that_pages_name_are_there() -> None:
+    known = {getattr(p, "envvar", None) for _, c in commands() for p in c.params}
+    known |= {"USDHAND_VERB_OPTION", "USDHAND_BLENDER_PYTHON", "USDHAND_CHROMIUM", "USDHAND_SHARED"}
+    assert "USDHAND_FILL_PRESET" in known
+    for page in PAGES:
+        for name in re.findall(r"USDHAND_[A-Z_]*[A-Z]", page.read_text(encoding="utf-8")):
+            assert name in known, f"{page.name}: {name}"
+
+
 def shown_commands(page: Path) -> list[str]:
     """Commands of `sh` blocks, and whole `python` blocks, in the order of the page."""
     text = page.read_text(encoding="utf-8")
