@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import usdhand
 from usdhand.motion import Clip, forward_kinematics
 from usdhand.motion import rotations as rot
 
-READ = sample("gestures/ok_01")
+READ = replace(sample("gestures/ok_01"), source=None)
 FULL = READ.with_rotations(rot.normalize(READ.rotations))  # files round them
 # Three joints of a body that stands in metres; the last one bends.
 THREE: dict[str, Any] = {
