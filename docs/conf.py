@@ -1,8 +1,10 @@
 """How the pages become a site: `sphinx-build -W docs out/site` (see docs/README.md)."""
 
+import re
 from typing import Any
 
 import usdhand
+from usdhand.options import declared
 
 project = "usdhand"
 author = "the usdhand authors"
@@ -26,15 +28,33 @@ def _escaped(_app: Any, _context: Any, lines: list[str]) -> None:
     lines[:] = [line.replace("*", r"\*") for line in lines]
 
 
-def _help_escaped(
-    _app: Any, _what: str, name: str, _value: Any, _options: Any, lines: list[str]
+def _described(
+    _app: Any, _what: str, _name: str, value: Any, _options: Any, lines: list[str]
 ) -> None:
-    """The docstrings of requests are help texts as well."""
-    if name.endswith("Request"):
-        _escaped(_app, None, lines)
+    """What stands behind a parameter's name describes it, and the examples of requests are shell.
+
+    napoleon takes the words behind the colon for a type; the types are in the code. What the fields
+    of a request are say its options.
+    """
+    found: list[str] = []
+    section = ""
+    for number, line in enumerate(lines):
+        if number + 1 < len(lines) and re.fullmatch("-{3,}", lines[number + 1]):
+            section = line
+        named = re.fullmatch(r"(\w[\w, ]*) : (.*)", line)
+        if section in ("Parameters", "Attributes") and named:
+            found += [named[1], f"    {named[2]}"]
+        elif re.fullmatch("Examples?:", line):
+            found += [f"{line}:", ""]
+        else:
+            found.append(line.replace("\b", ""))
+    if isinstance(value, type) and issubclass(value, usdhand.Request):
+        helps = ((own.name, own.option.help.replace("*", r"\*")) for own in declared(value))
+        found += ["", *(f":param {name}: {text}" for name, text in helps if text)]
+    lines[:] = found
 
 
 def setup(app: Any) -> None:
     """Called by Sphinx."""
-    app.connect("autodoc-process-docstring", _help_escaped)
     app.connect("sphinx-click-process-description", _escaped)
+    app.connect("autodoc-process-docstring", _described, priority=400)  # before napoleon

@@ -1,7 +1,7 @@
 """Options: what a person may set, declared once as the field of a frozen dataclass.
 
 The field's type, default and `Option` serve the command line, environment variables, JSON, its
-schema and the docs alike. Standard library only: a verb's options are known before numpy is loaded.
+schema and the docs alike. No numpy: a verb's options are known before it is loaded.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from usdhand.errors import UsageError
 
 Role = Literal["argument", "option", "settings"]
 
@@ -133,6 +135,33 @@ def alternatives(kind: Any) -> tuple[Any, ...]:
 def allows_none(kind: Any) -> bool:
     """Whether a type has None among its values."""
     return get_origin(kind) in (Union, UnionType) and type(None) in get_args(kind)
+
+
+def check_choices(value: Any) -> None:
+    """Refuse a dataclass with a choice that there is not.
+
+    Raises
+    ------
+    UsageError
+        if a field of a Literal type has another value.
+    """
+    owner: type = type(value)
+    for name, choices in _choices(owner).items():
+        chosen = getattr(value, name)
+        if chosen not in choices:
+            named = ", ".join(str(choice) for choice in choices if choice is not None)
+            raise UsageError(f"There is no {name} '{chosen}'; there are {named}.")
+
+
+@cache
+def _choices(owner: type) -> dict[str, tuple[Any, ...]]:
+    """Fields of a dataclass that are choices, and what there is to choose from."""
+    hints = {name: (alternatives(kind), kind) for name, kind in get_type_hints(owner).items()}
+    return {
+        name: (*(choice for one in kinds for choice in get_args(one)), *[None] * allows_none(kind))
+        for name, (kinds, kind) in hints.items()
+        if all(get_origin(one) is Literal for one in kinds)
+    }
 
 
 def is_settings(kind: Any) -> bool:

@@ -144,6 +144,12 @@ def test_every_request_has_a_name() -> None:
     assert {request_class(verb).__name__ for verb in VERBS} <= set(NAMES)
 
 
+def test_every_name_is_on_the_page_of_the_api() -> None:
+    page = (REPOSITORY / "docs" / "python.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^\.\. auto\w+:: usdhand\.(.*)$", page, re.M)
+    assert sorted(shown) == sorted(NAMES)
+
+
 def test_types_in_signatures_have_names() -> None:
     """Whoever holds a value that a function gives or takes can name its type."""
     missing = {}

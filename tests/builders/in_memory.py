@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,3 +65,43 @@ def reordered(given: dict[str, Any], order: Array) -> dict[str, Any]:
     for name in ("bind", "rest"):
         result[name] = given[name][order]
     return result
+
+
+def without_fingers(clip: Clip) -> Clip:
+    """The clip without the joints below its wrists, of a sample character."""
+    fingers = re.compile("Hand(Thumb|Index|Middle|Ring|Pinky)")
+    keep = [j for j, path in enumerate(clip.skeleton.joints) if not fingers.search(path)]
+    given = arrays_of(clip)
+    return Clip.from_arrays(**reordered(given, np.array(keep)))
+
+
+def still(clip: Clip) -> Clip:
+    """The clip held at its first frame."""
+    frames = len(clip)
+    return replace(
+        clip,
+        rotations=np.repeat(clip.rotations[:1], frames, axis=0),
+        translations=np.repeat(clip.translations[:1], frames, axis=0),
+    )
+
+
+def first_frame(clip: Clip) -> Clip:
+    """The clip's first frame alone."""
+    return replace(
+        clip,
+        rotations=clip.rotations[:1],
+        translations=clip.translations[:1],
+        scales=clip.scales[:1],
+    )
+
+
+def with_hand(clip: Clip, side: str, digits: str = "Thumb|Index|Middle|Ring|Pinky") -> Clip:
+    """The clip with the fingers of one side only, and of these only some digits."""
+    other = "Right" if side == "Left" else "Left"
+    lost = re.compile(f"{other}Hand\\w|{side}Hand(?!({digits}))\\w")
+    keep = [j for j, path in enumerate(clip.skeleton.joints) if not lost.search(path)]
+    arrays = arrays_of(clip)
+    chosen = {name: arrays[name][:, keep] for name in ("rotations", "translations", "scales")}
+    poses = {name: arrays[name][keep] for name in ("bind", "rest")}
+    joints = [arrays["joints"][j] for j in keep]
+    return Clip.from_arrays(**arrays | chosen | poses | {"joints": joints})

@@ -50,7 +50,12 @@ def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFA
 def read_character(path: str | Path, skel: str | None = None, reading: Reading = DEFAULT) -> Clip:
     """Read a character that may have no motion: a clip of one frame at its bind pose.
 
-    Raises the same errors as `read_clip`, except for a missing animation.
+    Raises
+    ------
+    InputError
+        if the file or skeleton cannot be used.
+    UsageError
+        if there are several skeletons and none is chosen.
     """
     path, reading = Path(path), _with_skel(reading, skel)
     if is_usd(path):
@@ -77,7 +82,13 @@ def read_any(
 
 
 def animation_names(path: str | Path) -> tuple[str, ...]:
-    """Names of the animations that a file holds; ("",) for USD, where one is bound."""
+    """Names of the animations that a file holds; ("",) for USD, where one is bound.
+
+    Raises
+    ------
+    InputError
+        if the file cannot be used.
+    """
     path = Path(path)
     return ("",) if is_usd(path) else tuple(_reader(path).animation_names(path))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from usdhand.display import displayed
-from usdhand.options import option
+from usdhand.options import check_choices, option
 from usdhand.units import read_unit
 
 
@@ -39,6 +39,9 @@ class Reading:
     up: Literal["Y", "Z"] | None = option(
         "Its up axis, if it is not USD.", "--input-up", default=None, key="input_up"
     )
+
+    def __post_init__(self) -> None:
+        check_choices(self)
 
 
 DEFAULT = Reading()

@@ -7,7 +7,7 @@ from typing import Literal
 
 from usdhand.display import displayed
 from usdhand.errors import UsageError
-from usdhand.options import option
+from usdhand.options import check_choices, option
 
 Fit = Literal["paper", "least-squares"]
 
@@ -82,6 +82,9 @@ class ReduceSettings:
     controllers: int = option(
         "How many channels one may follow (needs --fit least-squares).", default=1, at_least=1
     )
+
+    def __post_init__(self) -> None:
+        check_choices(self)
 
     @property
     def target(self) -> Target:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, get_args, get_origin
 
 from usdhand.display import displayed
 from usdhand.errors import UsageError
-from usdhand.options import alternatives, declared
+from usdhand.options import alternatives, check_choices, declared
 
 
 @displayed()
@@ -33,6 +33,7 @@ class Request:
         for own in declared(type(self)):
             value = getattr(self, own.name)
             object.__setattr__(self, own.name, _as_declared(own.name, own.type, value))
+        check_choices(self)
 
     def reported(self) -> dict[str, Any]:
         """Return the settings as reports have them: by key, those of settings among the others."""

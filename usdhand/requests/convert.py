@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from usdhand.display import displayed
 from usdhand.formats.reading import Reading
-from usdhand.options import argument, option, settings
+from usdhand.options import argument, check_choices, option, settings
 from usdhand.requests import shared
 from usdhand.requests.base import Request
 
@@ -60,6 +60,9 @@ class Edits:
         "Whether the character travels, or stays over the spot where it starts.", default="keep"
     )
     up: UpAxis | None = option("Up axis of the output (USD and BVH). [default: Y]", default=None)
+
+    def __post_init__(self) -> None:
+        check_choices(self)
 
     @property
     def of_frames(self) -> bool:

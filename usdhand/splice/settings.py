@@ -7,7 +7,7 @@ from typing import Literal
 
 from usdhand.display import displayed
 from usdhand.errors import UsageError
-from usdhand.options import option
+from usdhand.options import check_choices, option
 
 Align = Literal["local", "trunk"]
 Directions = Literal["spread", "axes"]
@@ -32,6 +32,9 @@ class Pin:
     tolerance: float = 0.0
     side: Literal["left", "right"] | None = None
     name: str = ""
+
+    def __post_init__(self) -> None:
+        check_choices(self)
 
     def __str__(self) -> str:
         return self.name or f"{self.body:g} s : {self.hand:g} s"
@@ -97,6 +100,7 @@ class SpliceSettings:
     tether: float = 0.3
 
     def __post_init__(self) -> None:
+        check_choices(self)
         if not all(0.0 < width <= 1.0 for width in self.band):
             raise UsageError("Bands are shares of the body's length: above 0 and at most 1.")
 

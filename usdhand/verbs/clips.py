@@ -30,12 +30,16 @@ def find_hands(
 
     Raises
     ------
+    UsageError
+        if a side is none.
     HandNotFoundError
         if there is no hand, or an ambiguous one, or none on the wanted side.
     """
     name = clip.origin.path or clip.name
-    if unknown := set(sides) - set(SIDES):
-        raise UsageError(f"There is no side '{min(unknown)}'; sides are {' and '.join(SIDES)}.")
+    unknown = set(sides) - set(SIDES)
+    if unknown or not sides:
+        which = f"There is no side '{min(unknown)}'" if unknown else "No side is given"
+        raise UsageError(f"{which}; sides are {' and '.join(SIDES)}.")
     try:
         character = map_character(clip.skeleton, conventions)
         wanted = [side for side in sides if side in character.hands]

@@ -22,7 +22,23 @@ def compare(
     align: bool = False,
     conventions: Conventions | None = None,
 ) -> Comparison:
-    """Compare motion B with motion A; see `usdhand.evaluate.compare.compare_clips`."""
+    """Compare motion B with motion A, both from their first frame on, at A's frame rate.
+
+    Characters may differ: hands are compared by anatomical channels, fingertips in the palm's axes.
+
+    Parameters
+    ----------
+    align : shift B by the lag that was found before comparing
+
+    Raises
+    ------
+    InputError
+        if a file cannot be used.
+    HandNotFoundError
+        if a clip has no hands.
+    UsageError
+        if the clips have no hand joint in common.
+    """
     first, second = (c if isinstance(c, Clip) else read_clip(c) for c in (a, b))
     hands, others = find_hands(first, conventions), find_hands(second, conventions)
     return compare_clips(first, second, hands, others, align)

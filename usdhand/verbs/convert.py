@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -43,7 +43,7 @@ from usdhand.motion.editing import (
 from usdhand.motion.resample import resample_like
 from usdhand.problems import Problem
 from usdhand.report.convert import convert_result, summary
-from usdhand.requests.convert import ConvertRequest, Edits
+from usdhand.requests.convert import ConvertRequest, Edits, UpAxis
 from usdhand.rigs import Conventions, load_conventions, map_character
 from usdhand.verbs.clips import find_hands
 from usdhand.verbs.files import find_files
@@ -97,14 +97,19 @@ def convert(
 
     Raises
     ------
+    InputError
+        if a file cannot be used.
+    UsageError
+        if there are several skeletons or animations and none is chosen, or edits cannot be meant.
+    HandNotFoundError
+        if fingers are to go to another character and the two have no hand in common.
     OutputError
         if the output is refused or cannot be written; nothing is left behind then.
     """
     edits, output = edits or Edits(), Path(output)
     inputs = [Path(path), *([Path(onto)] if onto else [])]
     check_output(output, inputs, force, WRITABLE)
-    if edits.up == "Z" and output.suffix.lower() in (".glb", ".gltf"):
-        raise UsageError(f"{output}: glTF is always Y up, so --up Z cannot be had.")
+    _check_up(output, edits.up or "Y")
     lost: tuple[Problem, ...] = ()
     source, animated = read_any(path, reading=reading)
     if onto is None:
@@ -158,20 +163,28 @@ def write_new(
     clip: Clip,
     output: str | Path,
     *,
-    up: str = "Y",
+    up: Literal["Y", "Z"] = "Y",
     animated: bool = True,
     force: bool = False,
 ) -> tuple[Problem, ...]:
     """Write a clip as a file of its own, and return what its format could not keep.
 
+    Parameters
+    ----------
+    up : up axis of the file
+    animated : False for a character at its bind pose
+
     Raises
     ------
+    UsageError
+        if the format cannot have this axis up.
     OutputError
         if the output is refused or cannot be written; nothing is left behind then.
     """
     output = Path(output)
     suffix = output.suffix.lower()
     check_output(output, [p for p in [clip.origin.path] if p], force, WRITABLE)
+    _check_up(output, up)
     if suffix in USD_SUFFIXES:
         return write_made(clip, output, up=up, animated=animated)
     with written_beside(output) as temporary:
@@ -187,7 +200,7 @@ def retarget_hands(hands: Clip, target: Clip, conventions: Conventions | None = 
     Raises
     ------
     HandNotFoundError
-        if the two have no hand in common.
+        if the two have no hand, or no finger joint of one, in common.
     """
     theirs = find_hands(hands, conventions)
     body = resample_like(target, hands)
@@ -201,7 +214,17 @@ def retarget_hands(hands: Clip, target: Clip, conventions: Conventions | None = 
     own = replace(own, frames={side: own.frames[side] for side in sides})
     taken, kept = theirs.encode(hands), own.encode(body)
     shared = [name for name in kept.names if name in set(taken.names)]
+    if not shared:
+        raise HandNotFoundError(f"{hands.name} and {target.name} have no finger joint in common.")
     return own.decode(kept.replaced(taken.select(shared)), body)
+
+
+def _check_up(output: Path, up: str) -> None:
+    """Refuse an up axis that the output cannot have, before anything is written."""
+    if up not in get_args(UpAxis):
+        raise UsageError(f"up: '{up}' is none of {' and '.join(get_args(UpAxis))}.")
+    if up == "Z" and output.suffix.lower() in (".glb", ".gltf"):
+        raise UsageError(f"{output}: glTF is always Y up, so --up Z cannot be had.")
 
 
 def _placed(clip: Clip, edits: Edits, retimed: bool) -> tuple[Clip, StageEdit]:

@@ -29,9 +29,7 @@ def expand(
     Raises
     ------
     InputError
-        if the file cannot be read, or holds no rig that fits together.
-    UsageError
-        if it has several rigs and none is chosen.
+        if the file cannot be read, or holds no rig, several, or one that contradicts itself.
     HandNotFoundError
         if its character has no hands.
     """
@@ -55,10 +53,10 @@ def expand_onto(
     Raises
     ------
     InputError
-        if a file cannot be read, or holds no rig.
+        if a file cannot be read, or holds no rig, several, or one that contradicts itself.
     UsageError
-        if there are several rigs or skeletons and none is chosen, or the target's hands have no
-        channel of the rig.
+        if the target has several skeletons and none is chosen, or its hands have no channel of the
+        rig.
     HandNotFoundError
         if the target has no hands.
     """

@@ -111,6 +111,13 @@ def write_filled(
 
     The variant set ``fingers`` is on the new SkelAnimation; ``choice_1``, the best, is selected.
     Joints that the body has beyond its file (`add_finger_joints`) are added to its Skeleton.
+
+    Raises
+    ------
+    InputError
+        if the file that it was read from was written anew since, or a result is no number.
+    OutputError
+        if the output is refused or cannot be written; nothing is left behind then.
     """
     best = filled.clips[0]
     digits = len(str(len(filled.clips)))  # so that editors sort them

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from usdhand.motion import Clip
 from usdhand.problems import Problem
 from usdhand.reduce.method import Reduction, apply_rig, fit_rig
 from usdhand.reduce.rig import ReducedRig
-from usdhand.reduce.settings import Fit, ReduceSettings
+from usdhand.reduce.settings import ReduceSettings
 from usdhand.report.plots import reducing as plotting
 from usdhand.report.plots.style import check_plots
 from usdhand.report.reduce import reduce_result, summary
@@ -53,17 +53,19 @@ def reduce_hands(
     Raises
     ------
     UsageError
-        if there is no clip, or the settings contradict each other.
+        if there is no clip, the settings contradict each other, or the rig has channels that a
+        clip's hands lack.
     HandNotFoundError
         if a clip has no hands.
+    InputError
+        if a clip has one frame, or the clips' hands have different joints, so that no rig can be
+        fitted to them.
+    QualityError
+        if the largest error that is asked for is not above 0.
     """
     settings = settings or ReduceSettings()
     if not clips:
         raise UsageError("There is no clip to reduce.")
-    if settings.fit not in get_args(Fit):
-        raise UsageError(
-            f"There is no fit '{settings.fit}'; there are {' and '.join(get_args(Fit))}."
-        )
     characters = _characters(clips)
     hands = [find_hands(clip, conventions, sides, characters[i]) for i, clip in enumerate(clips)]
     sources = [h.encode(clip) for clip, h in zip(clips, hands, strict=True)]
@@ -78,6 +80,11 @@ def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
     """Read the relations of a rig file, to apply them to other clips.
 
     ``skel`` chooses a rig by its skeleton where the file has several.
+
+    Raises
+    ------
+    InputError
+        if the file cannot be read, holds no rig or several, or one that contradicts itself.
     """
     return usd_rig.read_rig(path, skel)
 
@@ -90,6 +97,13 @@ def write_rig(
     A clip that was made in memory becomes a character with its own motion first.
 
     Returns what one file, if it was to be one, could not keep.
+
+    Raises
+    ------
+    InputError
+        if the file that it was read from was written anew since, or a result is no number.
+    OutputError
+        if the output is refused or cannot be written; nothing is left behind then.
     """
     character = character_under(reduction.clip, animated=True)
     return usd_rig.write_rig(reduction, character, Path(output), flatten=flatten, force=force)

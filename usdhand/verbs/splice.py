@@ -130,6 +130,15 @@ def write_spliced(
 
     The wrists are written too where they are the hand clip's. A body that was made in memory
     becomes a complete character.
+
+    Returns what one file, if it was to be one, could not keep.
+
+    Raises
+    ------
+    InputError
+        if the file that it was read from was written anew since, or a result is no number.
+    OutputError
+        if the output is refused or cannot be written; nothing is left behind then.
     """
     character = character_under(spliced.clip)
     clip = as_on_stage(spliced.clip, character)
