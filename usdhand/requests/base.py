@@ -17,8 +17,8 @@ from usdhand.options import alternatives, check_choices, declared
 class Request:
     """Base of all requests.
 
-    The docstring of a request is the help of its verb. Where it has a path, the name as a text will
-    do, and a list where it has several of something.
+    The docstring of a request is the help of its verb. Paths may be given as strings, and several
+    of something as a list.
 
     Attributes
     ----------
