@@ -21,5 +21,5 @@ def read_unit(text: str) -> float:
     except ValueError:
         number = 0.0
     if not 0.0 < number < float("inf"):
-        raise ValueError(f"'{text}' is none of {', '.join(UNITS)}, nor a number of cm.")
+        raise ValueError(f"'{text}' is neither one of {', '.join(UNITS)} nor a number of cm.")
     return number

@@ -272,7 +272,7 @@ def test_channels_that_do_not_fit_are_refused() -> None:
     clip = at_bind(RIG, 4)
     f = frames_of(RIG, INDEX, "left")
     channels = encode(clip, f)
-    with pytest.raises(UsageError, match="3 frames do not fit a clip of 4"):
+    with pytest.raises(UsageError, match="3 frames do not match a clip of 4"):
         decode(Channels(channels.names, channels.values[:3]), clip, f)
     with pytest.raises(UsageError, match="leThumbCMCx"):
         decode(Channels(channels.names[1:], channels.values[:, 1:]), clip, f)

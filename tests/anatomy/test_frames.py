@@ -290,7 +290,7 @@ def a_knuckle_on_the_wrist(at: Places) -> None:
         (all_on_one_spot, "bind"),
         (one_bone_without_length, "IndexMCP"),
         (knuckles_on_one_line, "one line"),
-        (a_knuckle_on_the_wrist, "wrist' and the next one of its digit lie on one spot"),
+        (a_knuckle_on_the_wrist, "wrist' and the next one of its digit are at the same point"),
     ],
 )
 def test_a_bind_pose_without_directions_is_refused(

@@ -68,7 +68,7 @@ def test_metrics_that_are_none_are_refused() -> None:
     with pytest.raises(usdhand.UsageError, match="metric x has no feature 'nose'"):
         usdhand.Metric("x", {"nose": 1.0})  # type: ignore[dict-item]
     for weights in ({}, {"wrist": 0.0}, {"wrist": -1.0}, {"wrist": np.nan}, {"wrist": np.inf}):
-        with pytest.raises(usdhand.UsageError, match="metric x needs weights above 0"):
+        with pytest.raises(usdhand.UsageError, match="metric x needs at least one weight above 0"):
             usdhand.Metric("x", weights)  # type: ignore[arg-type]
 
 
@@ -127,7 +127,7 @@ def test_tables_may_hold_tuples_and_later_ones_win() -> None:
     [
         ({"studio": {"wirst": "a"}}, r"^conventions: \[studio\] wirst: unknown key"),
         ({"studio": {"wrist": 3}}, r"^conventions: \[studio\] wrist: must be a name"),
-        ({"studio": "hand"}, "^conventions: 'studio' stands outside a table"),
+        ({"studio": "hand"}, "^conventions: 'studio' is outside a table"),
         ({"left": {"wrist": ""}}, r"^conventions: \[left\] wrist: must be the name of a joint"),
         ({"studio": {"like": "nobody"}}, r"^conventions: \[studio\] like"),
     ],

@@ -295,8 +295,8 @@ def test_two_candidates_for_a_finger_are_refused(run: Run, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("missing-controller", "does not have"),
-        ("circle", "circle"),
+        ("missing-controller", "is not in the rig"),
+        ("circle", "cycle"),
         ("version", "version"),
         ("kind", "unknown kind"),
         ("no-rig", "no hand rig"),

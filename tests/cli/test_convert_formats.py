@@ -230,4 +230,4 @@ def test_libraries_take_clips_of_other_formats(tmp_path: Path, suffix: str) -> N
 def test_check_is_for_usd(tmp_path: Path) -> None:
     bvh = tmp_path / "a.bvh"
     run("convert", TALK, "-o", bvh, "--trim", "1:5")
-    assert "no USD file" in run("check", bvh, code=3).output
+    assert "not a USD file" in run("check", bvh, code=3).output

@@ -186,12 +186,12 @@ def test_the_clip_itself_is_not_used(
 ) -> None:
     copy = SAMPLES / "gestures" / "ok_01.usdc"
     text = run("fill", copy, "--library", gestures_library, "-o", tmp_path / "a.usda", "--replace")
-    assert "not used, since it is the same clip: ok_01" in text.output
+    assert "not used, since it is the same performance: ok_01" in text.output
     clip = usdhand.read_clip(copy)
     filled = fill_fingers(replace(clip, name="other"), library, replace_motion=True)
     assert filled.left_out == ("ok_01",)  # by content
     only = replace(library, clips=tuple(c for c in library.clips if c.name == "ok_01"))
-    with pytest.raises(InputError, match="nothing but"):
+    with pytest.raises(InputError, match="contains only"):
         fill_fingers(clip, only, replace_motion=True)
 
 
@@ -247,7 +247,7 @@ def test_a_segment_without_candidates_does_not_fail_the_body(
     write_library(replace(library, clips=tuple(clips)), tmp_path / "long.usdc")
     out = tmp_path / "a.usda"
     text = run("fill", BODY, "--library", tmp_path / "long.usdc", "-o", out).output
-    assert "no segment of like length" in text
+    assert "no segment of similar length" in text
     data = json.loads(
         run(
             "fill", BODY, "--library", tmp_path / "long.usdc", "-o", out, "--force", "--json"

@@ -82,12 +82,12 @@ def test_splice_is_made_again_with_its_pins(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "code", "words"),
     [
-        ("", 3, "no JSON report"),
-        ("[" * 100_000, 3, "no JSON report"),
-        ("{}", 3, "holds no request"),
-        ('{"request": {"verb": "reduce"}, "inputs": [1]}', 3, "holds no request"),
+        ("", 3, "not a JSON report"),
+        ("[" * 100_000, 3, "not a JSON report"),
+        ("{}", 3, "has no request"),
+        ('{"request": {"verb": "reduce"}, "inputs": [1]}', 3, "has no request"),
         ('{"request": {"verb": "dance"}, "inputs": []}', 2, "no verb 'dance'"),
-        ('{"request": {"verb": "rerun", "report_file": "r.json"}, "inputs": []}', 2, "itself"),
+        ('{"request": {"verb": "rerun", "report_file": "r.json"}, "inputs": []}', 2, "run again"),
     ],
 )
 def test_what_is_no_report_is_refused(tmp_path: Path, content: str, code: int, words: str) -> None:

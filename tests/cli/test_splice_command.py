@@ -106,13 +106,13 @@ def test_dry_run_writes_nothing(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--pin", "1:1", "--pin", "9000:10"), "9000 is outside of the body"),
-        (("--pin", "1:1", "--pin", "10:9000"), "9000 is outside of the hand"),
+        (("--pin", "1:1", "--pin", "9000:10"), "9000 is outside the body"),
+        (("--pin", "1:1", "--pin", "10:9000"), "9000 is outside the hand"),
         (("--pin", "100:200", "--pin", "120:100"), "cross"),
         (("--pin", "100:200", "--pin", "100:100"), "contradict"),
-        (("--pin", "100"), "'100' is no pin"),
-        (("--pin", "a:b"), "'a:b' is no pin"),
-        (("--pin", "nan:1"), "'nan:1' is no pin"),
+        (("--pin", "100"), "'100' is not a pin"),
+        (("--pin", "a:b"), "'a:b' is not a pin"),
+        (("--pin", "nan:1"), "'nan:1' is not a pin"),
         (("--band", "0.3"), "two numbers"),
         (("--band", "0,2"), "above 0"),
         ((), "more than a factor of 3.3 apart"),
@@ -163,8 +163,8 @@ def test_a_clip_that_shows_a_part_is_refused_with_the_pins_that_place_it(
         splice_hands(read_clip(BODY), read_clip(HANDS), pins=["1:1"])
     other = SAMPLES / "conversations" / "talk_02_body.usdc"
     notes = splice_hands(read_clip(other), read_clip(HANDS)).problems
-    assert any("Nothing in the longer clip is like the shorter" in str(note) for note in notes)
-    with pytest.raises(UsageError, match=r"The body is like the hand clip from 0\.. s"):
+    assert any("Nothing in the longer clip resembles the shorter" in str(note) for note in notes)
+    with pytest.raises(UsageError, match=r"The body resembles 0\.. s to"):
         splice_hands(read_clip(HANDS), read_clip(FULL))
 
 

@@ -175,26 +175,26 @@ def test_the_pose_of_a_file_without_motion(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "line", "what"),
     [
-        ([("HIERARCHY", "<html>")], 1, "no BVH file"),
+        ([("HIERARCHY", "<html>")], 1, "not a BVH file"),
         ([("OFFSET 10 40 0", "OFFSET 10 40")], 9, "'CHANNELS' is not a usable number"),
         ([("OFFSET 10 40 0", "OFFSET 10 nan 0")], 8, "'nan' is not a usable number"),
         ([("    OFFSET 10 40 0\n", "")], 18, "has no OFFSET"),
-        ([("Xposition", "Xpos")], 5, "'Xpos' is no channel"),
+        ([("Xposition", "Xpos")], 5, "'Xpos' is not a channel"),
         ([("Yposition", "Xposition")], 5, "twice"),
-        ([("CHANNELS 6", "CHANNELS 1e9")], 5, "cannot be meant"),
-        ([("CHANNELS 6", "CHANNELS 7")], 6, "is no channel"),
+        ([("CHANNELS 6", "CHANNELS 1e9")], 5, "not plausible"),
+        ([("CHANNELS 6", "CHANNELS 7")], 6, "is not a channel"),
         ([("JOINT Arm", "ROOT Arm")], 6, "ROOT inside"),
         ([("JOINT Arm", "JOINT")], 6, "no name"),
         ([("JOINT Arm\n  {", "JOINT Arm")], 7, "no brace"),
         ([("}\nMOTION", "MOTION")], 20, "does not belong here"),
         ([("}\nMOTION", "}}\nMOTION")], 20, "does not belong here"),
-        ([("Frames: 3", "Frames: many")], 22, "no number of frames"),
-        ([("Frames: 3", "Frames: -3")], 22, "no number of frames"),
+        ([("Frames: 3", "Frames: many")], 22, "not a number of frames"),
+        ([("Frames: 3", "Frames: -3")], 22, "not a number of frames"),
         ([("Frames: 3\n", "")], 21, "no 'Frames:'"),
         ([("Frame Time: 0.0333333\n", "")], 22, "no 'Frame Time:'"),
-        ([("0.0333333", "0")], 23, "no usable time"),
-        ([("0.0333333", "nan")], 23, "no usable time"),
-        ([("0.0333333", "1e400")], 23, "no usable time"),
+        ([("0.0333333", "0")], 23, "not a usable frame time"),
+        ([("0.0333333", "nan")], 23, "not a usable frame time"),
+        ([("0.0333333", "1e400")], 23, "not a usable frame time"),
         ([("11 21 31", "11 x 31")], 25, r"\(frame 2\): 'x'"),
         ([("11 21 31", "11 nan 31")], 25, r"\(frame 2\): 'nan'"),
         ([("11 21 31", "11 -inf 31")], 25, r"\(frame 2\): '-inf'"),
@@ -226,7 +226,7 @@ def test_rows_beyond_those_declared_are_read_and_said(tmp_path: Path) -> None:
 def test_missing_and_empty_files(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.bvh: cannot be read"):
         read_clip(tmp_path / "none.bvh")
-    with pytest.raises(InputError, match="line 1: this is no BVH file"):
+    with pytest.raises(InputError, match="line 1: this is not a BVH file"):
         read_clip(written(tmp_path, b""))
     with pytest.raises(UsageError, match="one animation, 'take'"):
         read_clip(written(tmp_path, ARM), Reading(animation="walk"))
@@ -246,7 +246,7 @@ def test_few_channels_do_not_fill_the_memory(tmp_path: Path) -> None:
     ends = "End Site{OFFSET 0 1 0}" * 9000
     head = f"HIERARCHY ROOT a{{OFFSET 0 0 0 CHANNELS 1 Xrotation {ends}}} MOTION\n"
     text = head + "Frames: 100000\nFrame Time: 0.01\n" + "1\n" * 100_000
-    with pytest.raises(InputError, match="cannot be meant"):
+    with pytest.raises(InputError, match="not plausible"):
         read_clip(written(tmp_path, text))
 
 

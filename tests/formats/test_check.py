@@ -146,9 +146,9 @@ WRONG: dict[str, tuple[Make, str, str, str]] = {
     ),
     "no api": (character(without=["api"]), "error", SKEL_BINDING, stages.SKELETON),
     "no animation": (character(without=["binding"]), "warning", "no-animation", "no animation"),
-    "lost animation": (changed(bound_to("/Hero/No")), "error", "no-such-animation", "not there"),
+    "lost animation": (changed(bound_to("/Hero/No")), "error", "no-such-animation", "not exist"),
     "no SkelAnimation": (
-        changed(bound_to("/Hero")), "error", "no-such-animation", "no SkelAnimation",
+        changed(bound_to("/Hero")), "error", "no-such-animation", "not a SkelAnimation",
     ),
     "lost binding": (changed(second_animation), "warning", "lost-binding", "/Hero/Other"),
     "static": (character(rotations=waves()[:1]), "warning", "static-rotations", "Blender"),
@@ -193,7 +193,7 @@ WRONG: dict[str, tuple[Make, str, str, str]] = {
     ),
     "mirrored": (
         changed(lambda s: stages.place(s, scale=(-1, 1, 1)) and None),
-        "warning", "mirrored", "sides",
+        "warning", "mirrored", "left and right",
     ),
     "non-uniform": (
         changed(lambda s: stages.place(s, scale=(1, 2, 1)) and None),

@@ -43,7 +43,7 @@ FAULTS = {
     "negative node": (put("nodes", 1, "children", value=[-1]), r"children\[0\] is -1"),
     "cycle": (put("nodes", 6, "children", value=[1]), r"nodes\[\d\] has node \d as a child"),
     "loop": (put("nodes", 0, "children", value=[0]), r"has node|below itself"),
-    "deep": (deep, "stands below 500 others"),
+    "deep": (deep, "is below 500 others"),
     "huge count": (put("accessors", 0, "count", value=10**12), r"accessors\[0\] has a count of"),
     "endless count": (put("accessors", 0, "count", value=10**400), r"accessors\[0\] has a count"),
     "negative count": (put("accessors", 0, "count", value=-6), r"accessors\[0\]\.count is -6"),
@@ -58,9 +58,11 @@ FAULTS = {
     "stride": (put("bufferViews", 0, "byteStride", value=1), r"byteStride of 1, less than the 4"),
     "type": (put("accessors", 1, "type", value="VEC3"), r"type 'VEC3', not VEC4"),
     "component": (put("accessors", 0, "componentType", value=7), "componentType is 7, which"),
-    "text": (put("accessors", 0, "count", value="6"), r"accessors\[0\]\.count is no whole number"),
-    "no list": (put("nodes", value={}), "nodes is no JSON list"),
-    "no object": (put("nodes", 3, value=[]), r"nodes\[3\] is no JSON object"),
+    "text": (
+        put("accessors", 0, "count", value="6"), r"accessors\[0\]\.count is not a whole number"
+    ),
+    "no list": (put("nodes", value={}), "nodes is not a JSON list"),
+    "no object": (put("nodes", 3, value=[]), r"nodes\[3\] is not a JSON object"),
     "too few rows": (put("accessors", 1, "count", value=5), "has 5 rows for 6 keys"),
     "no such accessor": (
         put("animations", 0, "samplers", 0, "input", value=77), r"samplers\[0\]\.input is 77",
@@ -71,7 +73,7 @@ FAULTS = {
     "interpolation": (
         put("animations", 0, "samplers", 0, "interpolation", value="EASE"), "interpolation 'EASE'",
     ),
-    "no rotation": (put("nodes", 1, "rotation", value=[0, 0, 0, 0]), r"rotation has no length"),
+    "no rotation": (put("nodes", 1, "rotation", value=[0, 0, 0, 0]), r"rotation has length zero"),
     "three numbers": (put("nodes", 1, "rotation", value=[0, 0, 0]), r"has 3 numbers, not 4"),
     "huge number": (put("nodes", 1, "translation", value=[1e300, 0, 0]), r"translation\[0\] is 1e"),
     "endless number": (put("nodes", 1, "scale", value=[10**400, 0, 0]), r"scale\[0\] is huge"),
@@ -88,7 +90,7 @@ FAULTS = {
     ),
     "old": (put("asset", "version", value="1.0"), "is glTF 1.0"),
     "sparse row": (
-        put("accessors", 10, "sparse", "indices", "componentType", value=5126), "no unsigned",
+        put("accessors", 10, "sparse", "indices", "componentType", value=5126), "not unsigned",
     ),
     "sparse count": (put("accessors", 10, "sparse", "count", value=10**9), r"sparse replaces more"),
     "cameras only": (
@@ -129,7 +131,7 @@ def numbers_changed(at: int, value: float) -> GltfFile:
 @pytest.mark.parametrize(
     ("accessor", "value", "message"),
     [
-        (0, 0.01, r"accessors\[0\] has key times that go back, at key 2 \(0\.01 s\)"),
+        (0, 0.01, r"accessors\[0\] has key times that decrease, at key 2 \(0\.01 s\)"),
         (0, np.nan, r"accessors\[0\] holds nan in row 2"),
         (0, np.inf, r"accessors\[0\] holds inf in row 2"),
         (1, np.nan, r"accessors\[1\] holds nan in row 0"),
@@ -144,7 +146,7 @@ def test_a_quaternion_of_no_length(tmp_path: Path) -> None:
     file = everything()
     view = file.json["bufferViews"][1]
     file.data[view["byteOffset"] + 32 : view["byteOffset"] + 48] = bytes(16)
-    assert_refused(file.write(tmp_path / "take.glb"), r"quaternion of no length at key 2")
+    assert_refused(file.write(tmp_path / "take.glb"), r"quaternion of length zero at key 2")
 
 
 def test_keys_far_apart(tmp_path: Path) -> None:
@@ -160,7 +162,7 @@ def test_more_frames_than_memory(tmp_path: Path) -> None:
     shared, still = file.accessor([0.0, 10_000.0]), file.accessor(turns(2, 1))
     for node in nodes:
         file.curve(node, "rotation", shared, still)
-    assert_refused(file.write(tmp_path / "take.glb"), "frames of 401 joints cannot be meant")
+    assert_refused(file.write(tmp_path / "take.glb"), "frames of 401 joints are not plausible")
 
 
 def test_overlapping_accessors(tmp_path: Path) -> None:
@@ -195,11 +197,11 @@ def test_many_of_one_name(tmp_path: Path) -> None:
 def test_buffers_that_are_none(tmp_path: Path) -> None:
     path = tmp_path / "take.gltf"
     for uri, message in (
-        ("data:application/octet-stream;base64,A!B", r"buffers\[0\] has a uri that is no base64"),
+        ("data:application/octet-stream;base64,A!B", r"buffers\[0\] has a uri that is not base64"),
         ("data:application/octet-stream;base64,AAAA", r"buffers\[0\] has 3 bytes, not the"),
         ("data:", "data uri without a comma"),
-        ("https://example.org/x.bin", "which is no file beside it"),
-        ("/etc/passwd", "which is no file beside it"),
+        ("https://example.org/x.bin", "which is not a file beside it"),
+        ("/etc/passwd", "which is not a file beside it"),
         ("../../../../../../../../dev/zero", "is missing"),
         ("gone.bin", "gone.bin is missing"),
         ("a\0b", "cannot be read|is missing"),
@@ -218,18 +220,18 @@ def test_containers_that_are_none(tmp_path: Path) -> None:
     path = tmp_path / "take.glb"
     longer = whole[:12] + struct.pack("<I", 10**9) + whole[16:]
     for data, message in (
-        (b"", "is no glTF: Expecting value at line 1:1"),
+        (b"", "is not glTF: Expecting value at line 1:1"),
         (b"glTF", "ends at byte 4, within the header"),
         (whole[:-50], r"ends at byte \d+, but its header \(byte 8\) says"),
         (whole[:4] + b"\1\0\0\0" + whole[8:], r"version 1 \(byte 4\)"),
         (longer, "the chunk at byte 12 has 1000000000 bytes"),
-        (whole[:16] + b"BIN\0" + whole[20:], r"the first chunk \(byte 12\) is no JSON"),
+        (whole[:16] + b"BIN\0" + whole[20:], r"the first chunk \(byte 12\) is not JSON"),
         (glb(b'{"asset": }', b""), "Expecting value at byte 30"),
         (glb(b'{"asset": "\xff"}', b""), "no text at byte 31"),
         (glb(b"[" * 100_000, b""), "nested too deeply"),
         (glb(b'{"nodes": ' + b"[" * 100_000, b""), "nested too deeply"),
-        (glb(b"[]", b""), "its JSON is no object"),
-        (glb(b'{"a": ' + b"9" * 10_000 + b"}", b""), "nested too deeply or has endless numbers"),
+        (glb(b"[]", b""), "its JSON is not an object"),
+        (glb(b'{"a": ' + b"9" * 10_000 + b"}", b""), "has numbers that are too long"),
         (b'{\n "asset": 1,,\n}', "at line 2:13 of its JSON"),
         (b"\x89PNG\r\n", "no text at byte 0"),
     ):

@@ -151,7 +151,7 @@ def test_odd_scales_above_are_said(tmp_path: Path) -> None:
         file.curve(nodes[0], "rotation", TIMES, turns(9, 1))
         assert code in [p.code for p in read(file, tmp_path).problems]
     file.json["nodes"][0]["scale"] = [0, 1, 1]
-    with pytest.raises(InputError, match="stands below a zero scale"):
+    with pytest.raises(InputError, match="is below a zero scale"):
         read(file, tmp_path)
 
 

@@ -78,14 +78,14 @@ def nan_xform(stage: object) -> None:
 BAD: dict[str, tuple[str, Callable[[Path], object], str]] = {
     "missing": ("no.usda", lambda p: p, "no such file"),
     "folder": ("folder.usd", lambda p: p.mkdir(), "is a folder"),
-    "other suffix": ("take.fbx", text, "is no USD file"),
+    "other suffix": ("take.fbx", text, "is not a USD file"),
     "text": ("take.usd", text, "USD cannot read this file"),
     "text as usdc": ("take.usdc", text, "USD cannot read this file"),
     "text as usdz": ("take.usdz", text, "USD cannot read this file"),
     "empty": ("take.usdc", empty, "USD cannot read this file"),
     "truncated": ("take.usdc", truncated, "USD cannot read this file"),
     "no skeleton": (
-        "take.usda", lambda p: stages.layer(p).Save(), "no UsdSkel skeleton on this stage",
+        "take.usda", lambda p: stages.layer(p).Save(), "there is no UsdSkel skeleton on this stage",
     ),
     "no joints": ("take.usda", without_joints, "lists no joints"),
     "twice": ("take.usda", lambda p: WHOLE(p, joints=["a", "a/b", "a/b"]), "'a/b' twice"),
@@ -124,8 +124,8 @@ BAD: dict[str, tuple[str, Callable[[Path], object], str]] = {
     ),
     "no unit": ("take.usda", lambda p: WHOLE(p, meters=0.0), "metersPerUnit is 0"),
     "no rate": ("take.usda", lambda p: WHOLE(p, rate=0.0), "USD cannot read .*framesPerSecond"),
-    "zero scale": ("take.usda", lambda p: changed(p, zero_scale), "under a zero scale"),
-    "nan above": ("take.usda", lambda p: changed(p, nan_xform), "not-a-number in the transforms"),
+    "zero scale": ("take.usda", lambda p: changed(p, zero_scale), "below a zero scale"),
+    "nan above": ("take.usda", lambda p: changed(p, nan_xform), "not numbers"),
 }  # fmt: skip
 
 

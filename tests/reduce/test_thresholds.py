@@ -116,5 +116,5 @@ def test_what_cannot_be_asked_for() -> None:
     with pytest.raises(UsageError, match="-1"):
         thresholds_for_count(statistics, -1)
     for bad in (0.0, -1.0, float("nan")):
-        with pytest.raises(QualityError, match="cannot be met"):
+        with pytest.raises(QualityError, match="is not possible"):
             thresholds_for_error(statistics, bad)

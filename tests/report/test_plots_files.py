@@ -154,7 +154,7 @@ def test_plots_are_refused_before_any_work(tmp_path: Path) -> None:
     text = run("reduce", OK, "-n", "-o", tmp_path / "x.usda", "--plots", inside, code=2).output
     assert "is a file" in text
     text = run("reduce", OK, "-n", "-o", tmp_path / "x.usda", "--plots", "", code=2).output
-    assert "no folder has an empty name" in text
+    assert "a folder cannot have an empty name" in text
 
 
 def test_fill_and_evaluate_draw(library_file: Path, tmp_path: Path) -> None:

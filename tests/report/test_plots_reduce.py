@@ -133,7 +133,7 @@ def test_error_against_number_of_channels(reduction: Reduction) -> None:
             fitted = fit_relations(reduction.rig.names, statistics, limits, fit)
             best = np.array([relation.rms_error for relation in fitted])
             assert curve[count] == pytest.approx(np.sqrt(np.mean(best**2)), rel=1e-9)
-    bound = dict(drawn["PCA: the least of any linear model"])
+    bound = dict(drawn["PCA: the smallest error of any linear model"])
     assert bound[20] == pytest.approx(pca_rms(own, 20))
     [point] = next(xy for label, xy in drawn.items() if label.startswith("this rig"))
     assert point.tolist() == pytest.approx([len(reduction.rig.free), reduction.errors.rms_deg])

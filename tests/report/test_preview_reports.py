@@ -65,8 +65,8 @@ def test_rows_name_the_lane_that_they_tell_of(results: Results, tmp_path: Path) 
 def test_a_report_of_another_clip_is_refused(results: Results, tmp_path: Path) -> None:
     page = tmp_path / "other.html"
     for report, words in (
-        (results.fill_report, "but of filled.usda and ok_03.usdc"),
-        (results.splice_report, "but of spliced.usda and ok_03.usdc and ok_04.usdc"),
+        (results.fill_report, "but to filled.usda and ok_03.usdc"),
+        (results.splice_report, "but to spliced.usda and ok_03.usdc and ok_04.usdc"),
     ):
         done = run("preview", OK, "--with-report", report, "-o", page, code=2)
         assert words in done.output

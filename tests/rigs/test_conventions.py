@@ -212,7 +212,7 @@ def test_named_joints_win_over_the_convention(tmp_path: Path) -> None:
 def test_a_named_joint_that_is_not_there(tmp_path: Path) -> None:
     skeleton, _ = build(RIGS["humanik"])
     conventions = load_conventions(written(tmp_path, '[left]\nThumbCMC = "Daumen"\n'))
-    with pytest.raises(HandNotFoundError, match=r"\[left\] ThumbCMC: 'Daumen' is no joint"):
+    with pytest.raises(HandNotFoundError, match=r"\[left\] ThumbCMC: 'Daumen' is not in"):
         map_character(skeleton, conventions)
 
 
@@ -227,7 +227,7 @@ def test_too_few_named_joints_for_a_hand(tmp_path: Path) -> None:
     named = {j: n for j, n in RIGS["humanik"].items() if j[0] != "right"}
     skeleton, _ = build(named)
     conventions = load_conventions(written(tmp_path, '[right]\nwrist = "Head"\n'))
-    with pytest.raises(HandNotFoundError, match="names no whole hand"):
+    with pytest.raises(HandNotFoundError, match="names no complete hand"):
         map_character(skeleton, conventions)
 
 

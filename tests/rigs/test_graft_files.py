@@ -230,7 +230,7 @@ def test_body_only_bvh(library: Path, tmp_path: Path, name: str) -> None:
     hands = usdhand.find_hands(clip)
     for side in SIDES:
         assert f"{side} hand: {'L' if side == 'left' else 'R'}" in text
-        assert "stays as it is beside the added thumb" in text
+        assert "stays beside the added thumb" in text
         frames, hand = hands.frames[side], hands.character.hands[side]
         assert len(frames.names) == 15
         assert hand.elbow is not None

@@ -59,7 +59,7 @@ def test_the_place_of_a_thumb_is_noted(version: str) -> None:
         nonsense(), humanoid(version, THUMB[1:] if version == "vrm1" else THUMB[::2])
     )
     notes = map_character(skeleton).notes
-    assert f"names are those of {version} by the place of the thumb" in notes
+    assert f"names are read as those of {version}, by the position of the thumb" in notes
 
 
 def test_a_joint_between_two_named_ones() -> None:

@@ -250,7 +250,7 @@ def test_the_way_stays_open_beside_rows_of_many_columns() -> None:
 )
 def test_a_band_without_a_way_through_is_refused(low: list[int], high: list[int]) -> None:
     p, q = np.zeros((2, 3), np.uint64), np.zeros((1, 2, 6), np.uint64)
-    with pytest.raises(ValueError, match="no way through"):
+    with pytest.raises(ValueError, match="no path fits"):
         phase_path(p, q, *NO_TURN, np.array(low), np.array(high))
 
 

@@ -189,7 +189,7 @@ def decode(channels: Channels, clip: Clip, frames: HandFrames) -> Clip:
 def _decode(channels: Channels, clip: Clip, hands: Iterable[HandFrames]) -> Clip:
     if len(channels.values) != len(clip):
         raise UsageError(
-            f"Channels of {len(channels.values)} frames do not fit a clip of {len(clip)}."
+            f"Channels of {len(channels.values)} frames do not match a clip of {len(clip)}."
         )
     return _with(clip, [local_motion(channels, clip, frames) for frames in hands])
 

@@ -226,7 +226,7 @@ def _frame_from_motion(
     Only where there is no other way: frames from motion differ from clip to clip and from rig to
     rig, which is worse than an axis that is somewhat off.
     """
-    unknown = "geometry does not tell its flexion axis; taken from"
+    unknown = "geometry does not give its flexion axis, which is taken from"
     kept = above, f"{unknown} the bone before it"
     rotations = [LocalMotion(c).turn(*link).T for c in clips]
     if sum(map(len, rotations)) < 2:
@@ -261,7 +261,8 @@ def _digit_points(
 def _direction(skeleton: Skeleton, joint: int, bone: Array) -> Array:
     if np.linalg.norm(bone) < 1e-6:
         raise HandNotFoundError(
-            f"Joint '{skeleton.joints[joint]}' and the next one of its digit lie on one spot at "
-            "the bind pose, so its bone has no direction. The bind transforms are probably missing."
+            f"Joint '{skeleton.joints[joint]}' and the next one of its digit are at the same "
+            "point at the bind pose, so its bone has no direction. The bind transforms are "
+            "probably missing."
         )
     return bone

@@ -106,6 +106,6 @@ def _check_order(skeleton: Skeleton, hand: HandMap, links: tuple[Link, ...]) -> 
             raise HandNotFoundError(
                 f"Joint '{skeleton.joints[joint]}' of the {hand.side} hand moves with "
                 f"'{skeleton.joints[min(wrong)]}', which should move with it. Name the hand's "
-                "joints in a file and pass it with --map, or parent them as a hand's bones are."
+                "joints in a file and pass it with --map, or give them the hierarchy of a hand."
             )
         later.remove(joint)

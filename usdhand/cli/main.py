@@ -64,7 +64,7 @@ def unforeseen(error: Exception) -> str:
     said = " ".join(str(error).split()).encode("utf-8", "backslashreplace").decode()[:200]
     name = type(error).__name__
     what = f"{name}: {said}" if said else name
-    return f"Error: an error that usdhand did not expect ({what}); usdhand --debug shows where"
+    return f"Error: an unexpected error ({what}); usdhand --debug shows where"
 
 
 @click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})

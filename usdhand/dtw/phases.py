@@ -56,11 +56,11 @@ def phase_path(
     Raises
     ------
     ValueError
-        if there is no way through the band, or it leaves the matrix.
+        if no path fits in the band, or it leaves the matrix.
     """
     rows, columns = body.shape[1], hand.shape[2]
     if not _passable(low, high, rows, columns):
-        raise ValueError("there is no way through the band")
+        raise ValueError("no path fits in the band")
     starts = np.zeros(rows + 1, np.int64)
     for i in range(rows):
         starts[i + 1] = starts[i] + (high[i] - low[i]) // 4 + 1

@@ -134,7 +134,7 @@ def damage(arm: Array, fingers: Array) -> str:
         ("fingers", fingers, LARGEST_ANGLE_DEG),
     ):
         if not (worst := float(np.abs(values).max())) < most:
-            return f"a value of the {name} is {worst:.3g}, which no body has"
+            return f"a value of the {name} is {worst:.3g}, which is not plausible"
     return ""
 
 

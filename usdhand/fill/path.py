@@ -68,7 +68,7 @@ def best_path(nodes: Sequence[Array], edges: Sequence[Array]) -> SegmentPath:
 def alternative_paths(
     nodes: Sequence[Array], edges: Sequence[Array], count: int
 ) -> list[SegmentPath]:
-    """The best path and others that really differ, cheapest first.
+    """The best path and others that differ, cheapest first.
 
     The next cheapest paths of a long graph differ in a single node, which nobody would see. So a
     path must differ from every earlier one in a quarter of its layers: nodes that were taken are

@@ -54,7 +54,7 @@ class Metric:
                 f"{', '.join(get_args(Feature))}."
             )
         if not self.weights or not all(0.0 < w < math.inf for w in self.weights.values()):
-            raise UsageError(f"The metric {self.name} needs weights above 0, one at least.")
+            raise UsageError(f"The metric {self.name} needs at least one weight above 0.")
 
 
 METRICS: Mapping[str, Metric] = {
@@ -93,7 +93,7 @@ class Segmentation:
     def __post_init__(self) -> None:
         if not (self.speed > 0 and self.shortest > 0 and 2 * self.shortest <= self.longest):
             raise UsageError(
-                "Segments need a speed > 0, and a longest of at least twice the shortest."
+                "Segments need a speed above 0, and a longest of at least twice the shortest."
             )
 
 

@@ -18,14 +18,14 @@ def scale_problems(linear: Array, where: str) -> tuple[Problem, ...]:
     uneven = UNEVEN * smallest
     found = []
     if (smallest <= FLAT).any():
-        found.append(Problem("zero-scale", "a zero scale stands above the skeleton", where))
+        found.append(Problem("zero-scale", "there is a zero scale above the skeleton", where))
     if (largest > smallest + uneven).any():
-        message = "a non-uniform scale stands above the skeleton: bones are read with its mean"
+        message = "a non-uniform scale is above the skeleton: its mean is used for bone lengths"
         found.append(Problem("non-uniform-scale", message, where))
     if (np.linalg.det(linear) < 0).any():
-        message = "a mirroring stands above the skeleton: sides may swap"
+        message = "a transform above the skeleton mirrors it: left and right may be swapped"
         found.append(Problem("mirrored", message, where))
     if (np.abs(smallest - smallest[0]) > uneven[0]).any():
-        message = "the scale above the skeleton changes over time: that of the first frame is read"
+        message = "the scale above the skeleton changes over time: that of the first frame is used"
         found.append(Problem("animated-scale", message, where))
     return tuple(found)

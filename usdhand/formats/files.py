@@ -142,5 +142,5 @@ def _usd_skel(path: Path, reading: Reading) -> str | None:
         ("--input-up", reading.up),
     ):
         if value is not None:
-            raise UsageError(f"{path}: {name} is for other formats; a USD file says this itself.")
+            raise UsageError(f"{path}: {name} is for other formats; a USD file states this itself.")
     return reading.skel

@@ -54,13 +54,13 @@ def guess_units(
     if not fitting:
         message = (
             f"the file does not say its unit, and bones reaching {reach:.4g} from the root fit "
-            "none: read as centimetres; --units says otherwise"
+            "none: read as centimetres. If that is wrong, give --units"
         )
         return 1.0, Problem("guessed-units", message)
     name, cm = next(iter(fitting.items()))
     message = (
         f"the file does not say its unit: read as {name}, in which the bones reach "
-        f"{reach * cm:.0f} cm from the root; --units says otherwise"
+        f"{reach * cm:.0f} cm from the root. If that is wrong, give --units"
     )
     sure = told or name in METRIC
     return cm, Problem("guessed-units", message, severity="note" if sure else "warning")
@@ -122,7 +122,10 @@ def guess_up(poses: Iterable[Array], names: Iterable[str]) -> tuple[str, Problem
             said += float(np.clip(np.log(z / y), -2.0, 2.0))
     body = any(map(_LEG.search, names))  # hands alone may lie any way
     up = "Z" if body and said > np.log(CLEARLY_LONGER) else "Y"
-    message = f"the file does not say which axis is up: read as {up} up; --input-up says otherwise"
+    message = (
+        f"the file does not say which axis is up: read as {up} up. If that is wrong, give "
+        "--input-up"
+    )
     return up, Problem("guessed-up-axis", message, severity="note")
 
 

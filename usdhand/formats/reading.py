@@ -27,7 +27,7 @@ class Reading:
         "Path or name of the skeleton where there are several.", default=None, metavar="PRIM"
     )
     animation: str | None = option(
-        "Animation where a file has several.", default=None, metavar="NAME"
+        "Name of the animation where a file has several.", default=None, metavar="NAME"
     )
     cm_per_unit: float | None = option(
         "Unit of an input that is not USD: mm, cm, m, in, ft or a number of cm.",
@@ -37,7 +37,7 @@ class Reading:
         read=read_unit,
     )
     up: Literal["Y", "Z"] | None = option(
-        "Its up axis, if it is not USD.", "--input-up", default=None, key="input_up"
+        "Up axis of an input that is not USD.", "--input-up", default=None, key="input_up"
     )
 
     def __post_init__(self) -> None:

@@ -98,16 +98,16 @@ class ArrayRig:
             if a value is not finite, or a quaternion not of unit length.
         """
         if quaternions not in get_args(Quaternions):
-            raise UsageError(f"quaternions: '{quaternions}' is none of {_listed(Quaternions)}.")
+            raise UsageError(f"quaternions: '{quaternions}' is not one of {_listed(Quaternions)}.")
         q = _array("rotations", values, "(frames, joints, 4)", (None, len(self.joints), 4))
         if not len(q):
-            raise UsageError("rotations: there is no frame.")
+            raise UsageError("rotations: there are no frames.")
         _check_finite("rotations", q, self.joints)
         length = np.linalg.norm(q, axis=-1)
         if (bad := _first(np.abs(length - 1.0) > UNIT_TOLERANCE)) is not None:
             raise InputError(
                 f"rotations: {_at(bad, self.joints)}: the quaternion has the length "
-                f"{length[bad]:.4g} instead of 1, so it is no rotation."
+                f"{length[bad]:.4g} instead of 1, so it is not a rotation."
             )
         q = q[:, self.order] / length[:, self.order, None]
         self._check_order(q, quaternions)
@@ -132,7 +132,7 @@ class ArrayRig:
         scales = self._vectors("scales", values, frames)
         if (bad := _first((scales == 0).any(axis=-1))) is not None:
             where = _at(bad, self.joints)
-            raise InputError(f"scales: {where}: a scale of 0 leaves nothing of the joint.")
+            raise InputError(f"scales: {where}: a scale of 0 is not possible.")
         return scales[:, self.order]
 
     def doubts(self) -> tuple[Problem, ...]:
@@ -144,13 +144,13 @@ class ArrayRig:
                 ways[joint] = ways[parent] + np.linalg.norm(places[joint] - places[parent])
         reach, found = float(ways.max()), []
         if not REACH_CM[0] <= reach <= REACH_CM[1]:
-            message = f"the bones reach {reach:.3g} cm from the root: is the unit another one?"
+            message = f"the bones reach {reach:.3g} cm from the root: check the unit"
             found.append(Problem("odd-size", message))
         _, height, depth = np.ptp(places, axis=0)
         if BODY_CM <= reach <= REACH_CM[1] and depth > LYING * height:
             message = (
                 f"at its bind pose the character is {height:.0f} cm high and {depth:.0f} cm deep: "
-                "is another axis up?"
+                "check the up axis"
             )
             found.append(Problem("odd-up-axis", message))
         return tuple(found)
@@ -201,7 +201,7 @@ def rate_of(fps: float) -> float:
     except (TypeError, ValueError):
         rate = np.nan
     if not 0.0 < rate < np.inf:
-        raise UsageError(f"fps: {fps!r} frames a second cannot be: give a number above 0.")
+        raise UsageError(f"fps: {fps!r} frames a second are not possible: give a number above 0.")
     return rate
 
 
@@ -214,7 +214,7 @@ def _centimetres(units: str | float) -> float:
 
 def _turn(up: str) -> Array:
     if up not in get_args(UpAxis):
-        raise UsageError(f"up: '{up}' is none of {_listed(UpAxis)}.")
+        raise UsageError(f"up: '{up}' is not one of {_listed(UpAxis)}.")
     return to_y_up(up)
 
 
@@ -241,7 +241,7 @@ def _names(joints: Sequence[str]) -> list[str]:
         raise UsageError("joints: give a list of names or paths.")
     names = list(joints)
     if not names:
-        raise UsageError("joints: there is none.")
+        raise UsageError("joints: there are none.")
     for number, name in enumerate(names):
         if not name or not leaf_name(name):
             raise UsageError(f"joints: number {number} has no name ({name!r}).")
@@ -253,18 +253,18 @@ def _tree(names: list[str], parents: ArrayLike | None) -> tuple[tuple[str, ...],
     paths = any("/" in name for name in names)
     if parents is None:
         if not paths and len(names) > 1:
-            raise UsageError("joints: names alone do not say what hangs where: give parents=.")
+            raise UsageError("joints: names alone do not give the hierarchy: give parents=.")
         above = parents_from_paths(names)
     else:
         above = _checked_parents(names, parents)
         if paths and (bad := _first(np.not_equal(above, parents_from_paths(names)))) is not None:
-            raise UsageError(f"parents: that of '{names[bad[0]]}' is not the one of its path.")
+            raise UsageError(f"parents: that of '{names[bad[0]]}' is not the one in its path.")
         if not paths:
             for joint in _parents_first(above).tolist():
                 if above[joint] >= 0:
                     names[joint] = f"{names[above[joint]]}/{names[joint]}"
     if double := next((n for i, n in enumerate(names) if n in names[:i]), None):
-        raise UsageError(f"joints: '{double}' is there twice.")
+        raise UsageError(f"joints: '{double}' is given twice.")
     return tuple(names), above
 
 
@@ -274,15 +274,16 @@ def _checked_parents(names: list[str], parents: ArrayLike) -> NDArray[np.intp]:
     inside = (given >= -1) & (given < len(names)) & (given != np.arange(len(names)))
     if (bad := _first(~(whole & inside))) is not None:
         raise UsageError(
-            f"parents: {given[bad]:.0f} is no parent of joint {bad[0]} '{names[bad[0]]}': give the "
-            f"index of another joint, 0 to {len(names) - 1}, or -1 for a root."
+            f"parents: {given[bad]:.0f} is not a possible parent of joint {bad[0]} "
+            f"'{names[bad[0]]}': give the index of another joint, 0 to {len(names) - 1}, or -1 for "
+            "a root."
         )
     above: NDArray[np.intp] = given.astype(np.intp)
     top = above
     for _ in names:  # whoever is not above a root by now never will be
         top = np.where(top >= 0, above[top], -1)
     if (bad := _first(top >= 0)) is not None:
-        raise UsageError(f"parents: joint '{names[bad[0]]}' hangs off itself, in a circle.")
+        raise UsageError(f"parents: joint '{names[bad[0]]}' is its own ancestor.")
     return above
 
 
@@ -311,14 +312,14 @@ def _array(name: str, values: Any, form: str, *shapes: tuple[int | None, ...]) -
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, RuntimeError) as error:
-        raise UsageError(f"{name}: this is no array of numbers ({error}).") from error
+        raise UsageError(f"{name}: this is not an array of numbers ({error}).") from error
     for shape in shapes:
         if len(shape) == array.ndim and all(
             want in (None, have) for want, have in zip(shape, array.shape, strict=True)
         ):
             return array
     wanted = " or ".join("(" + ", ".join(str(n or "frames") for n in s) + ")" for s in shapes)
-    raise UsageError(f"{name}: the shape is {array.shape}; it must be {form}, here {wanted}.")
+    raise UsageError(f"{name}: the shape is {array.shape}; it must be {form}, that is {wanted}.")
 
 
 def _check_finite(

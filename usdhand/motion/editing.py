@@ -82,7 +82,7 @@ def starting_at(clip: Clip, time_code: float) -> Clip:
         if that is no time.
     """
     if not abs(time_code) <= LATEST_START:
-        raise UsageError(f"A start of {time_code:g} cannot be meant: give a time code.")
+        raise UsageError(f"A start of {time_code:g} is not possible: give a time code.")
     return replace(clip, origin=replace(clip.origin, first_time_code=float(time_code)))
 
 
@@ -97,7 +97,7 @@ def scaled(clip: Clip, factor: float) -> Clip:
         if the factor is not a positive number.
     """
     if not SMALLEST_SCALE <= factor <= 1.0 / SMALLEST_SCALE:
-        raise UsageError(f"A scale of {factor:g} cannot be meant: give a number > 0.")
+        raise UsageError(f"A scale of {factor:g} is not possible: give a number above 0.")
     bind, rest = clip.skeleton.bind.copy(), clip.skeleton.rest.copy()
     bind[:, :3, 3] *= factor
     rest[:, :3, 3] *= factor

@@ -39,7 +39,7 @@ def resample(clip: Clip, fps: float) -> Clip:
     """
     if not np.isfinite(fps) or fps <= 0:
         raise UsageError(
-            f"Cannot resample {clip.name} to {fps} frames a second: give a number > 0."
+            f"Cannot resample {clip.name} to {fps} frames a second: give a number above 0."
         )
     count = int(np.floor(clip.duration * fps + 1e-6)) + 1
     frames = np.asarray(np.arange(count) * (clip.fps / fps), float)

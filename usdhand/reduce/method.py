@@ -80,11 +80,11 @@ def fit_rig(
         if settings contradict each other.
     """
     if most_controllers > 1 and fit == "paper":
-        raise UsageError("Several controllers a channel need the least-squares fit.")
+        raise UsageError("Several controllers per channel need the least-squares fit.")
     for clip in clips:
         if len(clip) < 2:
             raise InputError(
-                f"{clip.origin.path or clip.name} has one frame: what moves cannot be told from it."
+                f"{clip.origin.path or clip.name} has only one frame, which shows no motion."
             )
     names = hands[0].model_names
     for clip, other in zip(clips, hands, strict=True):

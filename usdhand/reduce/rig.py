@@ -124,12 +124,12 @@ def evaluation_order(relations: Sequence[Relation]) -> tuple[Relation, ...]:
                 del chain[name]
             elif controller not in by_name:
                 raise InputError(
-                    f"Channel '{name}' follows '{controller}', which the rig does not have."
+                    f"Channel '{name}' follows '{controller}', which is not in the rig."
                 )
             elif controller in chain:
                 names = list(chain)
                 circle = " -> ".join([*names[names.index(controller) :], controller])
-                raise InputError(f"The rig's channels control each other in a circle: {circle}.")
+                raise InputError(f"The rig's channels control each other in a cycle: {circle}.")
             elif controller not in done:
                 chain[controller] = iter(by_name[controller].controllers)
     return tuple(done.values())

@@ -25,7 +25,7 @@ def thresholds_for_count(statistics: Statistics, count: int, fit: Fit = "paper")
         if ``count`` is negative.
     """
     if count < 0:
-        raise UsageError(f"{count} free channels cannot be had: give 0 or more.")
+        raise UsageError(f"{count} free channels are not possible: give 0 or more.")
     if count >= statistics.moving(0.0).sum():
         return Thresholds(0.0, 0.0)
     best: tuple[tuple[int, float, float], Thresholds] | None = None
@@ -54,7 +54,9 @@ def thresholds_for_error(statistics: Statistics, most: float, fit: Fit = "paper"
         if ``most`` is not a positive number of degrees.
     """
     if not most > 0:
-        raise QualityError(f"An RMS error of at most {most:g} degrees cannot be met: give > 0.")
+        raise QualityError(
+            f"An RMS error of at most {most:g} degrees is not possible: give a number above 0."
+        )
     best: tuple[tuple[int, float, float], Thresholds] | None = None
     for limit, rmsds, roots in _threshold_choices(statistics):
         if statistics.std[~statistics.moving(limit)].max(initial=0.0) > most:

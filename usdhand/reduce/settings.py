@@ -65,10 +65,14 @@ class ReduceSettings:
         at_most=4,
     )
     range_deg: float | None = option(
-        "Constant below this range.", "--range", default=None, metavar="DEG", key="range"
+        "Channels with a smaller range are constant.",
+        "--range",
+        default=None,
+        metavar="DEG",
+        key="range",
     )
     rmsd: float | None = option(
-        "Linear below this RMS deviation (0 to 2).", default=None, metavar="X"
+        "Channels with a smaller RMS deviation (0 to 2) are linear.", default=None, metavar="X"
     )
     free_channels: int | None = option(
         "Leave N channels free.", "--target-dofs", default=None, metavar="N", key="target_dofs"
@@ -77,10 +81,10 @@ class ReduceSettings:
         "Largest RMS error of any channel allowed.", default=None, metavar="DEG"
     )
     fit: Fit = option(
-        "Slopes that keep standard deviations, or with the least error.", default="paper"
+        "Slopes that keep standard deviations, or slopes with the smallest error.", default="paper"
     )
     controllers: int = option(
-        "How many channels one may follow (needs --fit least-squares).", default=1, at_least=1
+        "How many channels a channel may follow (needs --fit least-squares).", default=1, at_least=1
     )
 
     def __post_init__(self) -> None:

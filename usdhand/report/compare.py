@@ -46,7 +46,7 @@ def summary(result: Mapping[str, Any], verbose: bool) -> str:
         f"RMS {result['rms_deg']:.3f} deg, max {result['max_deg']:.3f} deg\n"
         f"fingertips: mean {tips['mean']:.3f} mm, max {tips['max']:.3f} mm\n"
         f"jerk: A {jerk['a']:.3g}, B {jerk['b']:.3g} deg/s^3\n"
-        f"lag of B: {'hands too still to tell' if lag is None else f'{lag:+.4f} s'}"
+        f"lag of B: {'the hands move too little' if lag is None else f'{lag:+.4f} s'}"
     ]
     rows = sorted(result["channels"], key=lambda c: -c["rms_deg"])
     parts.append(_angles("channel", rows if verbose else rows[:5]))

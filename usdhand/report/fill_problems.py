@@ -24,10 +24,11 @@ def fill_problems(
 
 def _hands(filled: Filled, body: str) -> Iterator[Problem]:
     if filled.kept:
-        message = f"the {' and '.join(filled.kept)} fingers move already and are kept"
+        which = " and ".join(filled.kept)
+        message = f"the {which} fingers move already and are kept; --replace replaces them"
         yield Problem("kept", message, file=body)
     for side in filled.without:
-        message = f"the library has no motion of a {side} hand like this; it stays as it is"
+        message = f"the library has no motion of a {side} hand like this one; it stays as it is"
         yield Problem("no-motion", message)
     for side in filled.still:
         message = f"the {side} arm does not move, so its fingers hold one pose"
@@ -50,12 +51,13 @@ def _joints(filled: Filled, library: MotionLibrary) -> Iterator[Problem]:
             else "no clip of the library"
         )
         verb = "has" if len(some) < 2 else "have"
-        message = f"{which} {verb} {', '.join(names)} of the {side} hand: kept as in the body"
+        joints = f"{', '.join(names)} of the {side} hand"
+        message = f"{which} {verb} {joints}: they keep the body's values"
         yield Problem("missing-joints", message)
     for side, names in filled.set_aside.items():
         message = (
             f"{side} hand: {counted(len(names), 'clip')} of the library set aside for lack of "
-            f"joints that the others have ({listed(names)})"
+            f"joints that most others have ({listed(names)})"
         )
         yield Problem("set-aside", message)
 
@@ -65,15 +67,15 @@ def _candidates(filled: Filled, settings: FillSettings) -> Iterator[Problem]:
         if part.usable < settings.k:
             message = (
                 f"the library has only {counted(part.usable, 'segment')} for the "
-                f"{' and '.join(part.part)} hand, fewer than the {settings.k} candidates a "
+                f"{' and '.join(part.part)} hand, fewer than the {settings.k} candidates per "
                 "segment that were asked for"
             )
             yield Problem("few-segments", message)
     if len(filled.clips) < settings.alternatives:
         ways = "is only 1 way" if len(filled.clips) == 1 else f"are only {len(filled.clips)} ways"
-        yield Problem("few-alternatives", f"there {ways} that really differ")
+        yield Problem("few-alternatives", f"there {ways} that differ")
     if filled.left_out:
-        message = f"not used, since it is the same clip: {', '.join(filled.left_out)}"
+        message = f"not used, since it is the same performance: {', '.join(filled.left_out)}"
         yield Problem("same-motion", message)
 
 
@@ -85,7 +87,7 @@ def _stretched(filled: Filled) -> Iterator[Problem]:
             continue
         for side in part.part:
             message = (
-                f"{side} hand: the library has no segment of like length for {len(odd)} of "
+                f"{side} hand: the library has no segment of similar length for {len(odd)} of "
                 f"{len(best)} segments; their fingers move up to "
                 f"{max(max(x, 1 / x) for x in odd):.1f} times faster or slower"
             )

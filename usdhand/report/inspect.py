@@ -109,7 +109,7 @@ def _text(result: Mapping[str, Any], verbose: bool) -> str:
     lines = [
         f"{result['path']}",
         f"  {skeleton}{result['joints']} joints, "
-        f"{result['cm_per_unit']:g} cm a unit, {result['up_axis']} up",
+        f"{result['cm_per_unit']:g} cm per unit, {result['up_axis']} up",
     ]
     if result["animation"]:
         lines.append(

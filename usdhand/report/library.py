@@ -51,7 +51,8 @@ def summary(data: Mapping[str, Any], verbose: bool) -> str:
     if not built:
         lines += [f"left out: {x['path']}: {x['reason']}" for x in data["left_out"]]
     lines += [f"cannot be used: {x['path']}: {x['reason']}" for x in data["damaged"]]
-    lines += [f"file gone (fine for fill, not for evaluate): {path}" for path in data["gone"]]
+    why = "file missing (evaluate needs it, fill does not)"
+    lines += [f"{why}: {path}" for path in data["gone"]]
     if built:
         read = f"{counted(data['read'], 'clip')} read, {data['unchanged']} unchanged"
         lines += [read, f"written to {data['output']}"]

@@ -14,7 +14,7 @@ from usdhand.requests.base import Request
 @displayed()
 @dataclass(frozen=True, kw_only=True)
 class CheckRequest(Request):
-    """Check files with UsdValidation and rules of our own.
+    """Check files with UsdValidation and additional rules.
 
     Finds what validators miss and tools stumble on: joint names that are no legal prim names,
     missing bind, rest or scales, time codes that would be rescaled. Exit 1 if there is an error.

@@ -60,7 +60,7 @@ def base_of(own: Declared, chosen: object) -> Any:
 def _changed(base: Any, data: Any, where: str) -> Any:
     """Settings with what the data says instead."""
     if not isinstance(data, Mapping):
-        raise UsageError(f"'{where}' is no object of settings.")
+        raise UsageError(f"'{where}' is not an object of settings.")
     hints = get_type_hints(type(base))
     _check_names(data, hints, f"'{where}'")
     given = {k: _value(hints[k], v, f"{where}.{k}") for k, v in data.items()}
@@ -75,9 +75,9 @@ def _bounded(own: Declared, value: Any, where: str) -> Any:
     least, most = own.option.at_least, own.option.at_most
     if isinstance(value, int):
         if least is not None and value < least:
-            raise UsageError(f"'{where}' cannot be {value}: {least} is the least.")
+            raise UsageError(f"'{where}' cannot be {value}: it must be at least {least}.")
         if most is not None and value > most:
-            raise UsageError(f"'{where}' cannot be {value}: {most} is the most.")
+            raise UsageError(f"'{where}' cannot be {value}: it must be at most {most}.")
     return value
 
 

@@ -27,14 +27,14 @@ class CompareRequest(Request):
 
     verb: ClassVar[str] = "compare"
     verbose: ClassVar[str] = "Print every channel."
-    a: Path = argument("The motion to compare with.")
-    b: Path = argument("The motion that is compared.")
-    align: bool = option("Shift B by the lag that is found, then compare.", default=False)
+    a: Path = argument("The reference motion.")
+    b: Path = argument("The motion to compare with it.")
+    align: bool = option("Shift B by the measured lag, then compare.", default=False)
     max_rms: float | None = option(
-        "Exit 5 if the RMS over channels is larger.", default=None, metavar="DEG"
+        "Exit code 5 if the RMS over channels is larger.", default=None, metavar="DEG"
     )
     skel: str | None = shared.skel()
-    skel_b: str | None = shared.skel("Skeleton of B, if it is another one.")
+    skel_b: str | None = shared.skel("Skeleton of B, if it is a different one.")
     maps: tuple[Path, ...] = shared.maps()
     report: Path | None = shared.report()
     force: bool = shared.force("a report")

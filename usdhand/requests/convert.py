@@ -28,7 +28,7 @@ def read_span(text: str) -> tuple[float | None, float | None]:
     try:
         first, last = (float(part) if part.strip() else None for part in text.split(":"))
     except ValueError as error:
-        raise ValueError(f"'{text}' is no FIRST:LAST in time codes.") from error
+        raise ValueError(f"'{text}' is not FIRST:LAST in time codes.") from error
     return first, last
 
 
@@ -55,9 +55,9 @@ class Edits:
         metavar="FIRST:LAST",
         read=read_span,
     )
-    scale: float = option("Factor on the character's size.", default=1.0)
+    scale: float = option("Factor for the size of the character.", default=1.0)
     root_motion: RootMotion = option(
-        "Whether the character travels, or stays over the spot where it starts.", default="keep"
+        "Whether the character travels, or stays where it starts.", default="keep"
     )
     up: UpAxis | None = option("Up axis of the output (USD and BVH). [default: Y]", default=None)
 

@@ -38,9 +38,9 @@ class EvaluateRequest(Request):
         metavar="PATH",
         reported=False,
     )
-    preset: Preset = option("Settings of fill, see `usdhand fill`.", default="default")
+    preset: Preset = option("Settings of fill; see `usdhand fill`.", default="default")
     metric: str | None = option("Metric of fill instead of the preset's.", default=None)
-    labels_only: bool = option("Only the share of labels, no reconstruction.", default=False)
+    labels_only: bool = option("Measure label agreement only, no reconstruction.", default=False)
     maps: tuple[Path, ...] = shared.maps()
     report: Path | None = shared.report()
     plots: Path | None = shared.plots()

@@ -35,13 +35,13 @@ class FillRequest(Request):
     verbose: ClassVar[str] = "Print every segment."
     body: Path = argument("The clip whose fingers are missing or still.")
     library: Path = option(
-        "Library that the fingers are taken from, see `usdhand library build`.",
+        "Library with the fingers; see `usdhand library build`.",
         metavar="LIB",
         reported=False,
     )
     output: Path = shared.output("The body with fingers (.usda, .usdc, .usd, .usdz).")
     preset: Preset = option(
-        "All settings together: the measured best, or the paper's.", default="default"
+        "All settings at once: the measured best, or the paper's.", default="default"
     )
     settings: FillSettings = settings(FillSettings(), bases=PRESETS, chosen_by="preset")
     replace: bool = option("Replace fingers that already move.", default=False)

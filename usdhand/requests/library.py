@@ -32,7 +32,7 @@ class LibraryBuildRequest(Request):
     clips: tuple[str, ...] = argument("Clips, folders and wildcards.")
     output: Path = shared.output("The library (.usdc, .usda, .usd).")
     labels: Path | None = option(
-        "Columns file, label and (if wanted) actor; else labels are taken from file names.",
+        "Columns file, label and optionally actor; without it labels come from file names.",
         default=None,
         metavar="FILE.csv",
     )

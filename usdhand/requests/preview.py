@@ -25,10 +25,12 @@ class PreviewSettings:
     """
 
     max_frames: int = option(
-        "Longer clips keep every second, third, ... frame.", default=10_800, at_least=2
+        "Largest number of frames; longer clips keep every second, third, ... frame.",
+        default=10_800,
+        at_least=2,
     )
     max_points: int = option(
-        "Characters with larger meshes are shown as bones; 0 for bones only.",
+        "Largest number of mesh points; larger characters are shown as bones, 0 shows bones only.",
         default=40_000,
         at_least=0,
     )
@@ -56,7 +58,7 @@ class PreviewRequest(Request):
     files: tuple[str, ...] = argument("Files, folders and wildcards.")
     output: Path = shared.output("The page (.html).")
     reports: tuple[Path, ...] = option(
-        "JSON report of fill or splice of one of the files: its segments, phases and pins are on "
+        "JSON report of fill or splice of one of the files: shows its segments, phases and pins on "
         "the timeline; repeatable.",
         "--with-report",
         default=(),

@@ -37,7 +37,7 @@ class ReduceRequest(Request):
     )
     settings: ReduceSettings = settings(ReduceSettings())
     rig: Path | None = option(
-        "Apply the relations of this rig instead of fitting.", default=None, metavar="RIG"
+        "Apply the relations of this rig instead of fitting one.", default=None, metavar="RIG"
     )
     side: shared.Sides = shared.side()
     flatten: bool = shared.flatten()

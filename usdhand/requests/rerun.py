@@ -38,7 +38,7 @@ class RerunRequest(Request):
         written=True,
         reported=False,
     )
-    accept_changes: bool = option("Take inputs as they are now.", default=False)
+    accept_changes: bool = option("Use inputs as they are now, also changed ones.", default=False)
     report: Path | None = shared.report()
     dry_run: bool = shared.dry_run()
     force: bool = shared.force()

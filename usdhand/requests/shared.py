@@ -23,7 +23,7 @@ def force(what: str = "an output") -> Any:
 def dry_run() -> Any:
     """``-n``: everything but writing."""
     return option(
-        "Do everything but write the output.", "-n", "--dry-run", default=False, reported=False
+        "Do everything except writing the output.", "-n", "--dry-run", default=False, reported=False
     )
 
 
@@ -86,7 +86,7 @@ def folder(text: str) -> Path:
         if it is empty.
     """
     if not text:
-        raise ValueError("no folder has an empty name; this folder is '.'")
+        raise ValueError("a folder cannot have an empty name; the current folder is '.'")
     return Path(text)
 
 

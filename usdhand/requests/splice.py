@@ -49,7 +49,7 @@ class SpliceRequest(Request):
     side: shared.Sides = shared.side()
     flatten: bool = shared.flatten()
     skel: str | None = shared.skel()
-    hands_skel: str | None = shared.skel("The same for the hand clip.")
+    hands_skel: str | None = shared.skel("Skeleton of the hand clip where there are several.")
     maps: tuple[Path, ...] = shared.maps()
     report: Path | None = shared.report()
     plots: Path | None = shared.plots()

@@ -25,20 +25,20 @@ VERBS = {
     "library info": ("LibraryInfoRequest", "Show what is in a library."),
     "fill": ("FillRequest", "Give a body clip the fingers of similar motions from a library."),
     "splice": ("SpliceRequest", "Put the fingers of a hand clip on a body clip, retimed to it."),
-    "evaluate": ("EvaluateRequest", "Measure how well a library tells fingers from arms."),
+    "evaluate": ("EvaluateRequest", "Measure how well a library predicts fingers from arms."),
     "compare": ("CompareRequest", "Compare two motions: degrees, fingertips, smoothness, lag."),
     "convert": (
         "ConvertRequest",
         "Convert between USD, BVH, glTF and FBX; put fingers on other characters.",
     ),
-    "preview": ("PreviewRequest", "Make a page to look at clips with in a browser."),
-    "check": ("CheckRequest", "Check files with UsdValidation and rules of our own."),
-    "schema": ("SchemaRequest", "Print the folder of the USD schema for PXR_PLUGINPATH_NAME."),
+    "preview": ("PreviewRequest", "Make a page that shows clips in a browser."),
+    "check": ("CheckRequest", "Check files with UsdValidation and additional rules."),
+    "schema": ("SchemaRequest", "Print the folder of the USD schema, or a JSON Schema."),
     "rerun": ("RerunRequest", "Make a result again from its report."),
 }
 
 # Verbs that are two words -> what the first one is about.
-GROUPS = {"library": "Build a motion library, and show what is in one."}
+GROUPS = {"library": "Build a motion library, or show what is in it."}
 
 
 def request_class(verb: str) -> type[Request]:

@@ -62,7 +62,7 @@ def _lookup(rig: NamedJoints, table: str, role: str, name: str) -> int:
     joint = rig.skeleton.find(name)
     if joint is None:
         many = rig.skeleton.names.count(name)
-        why = f"is the name of {many} joints: give a path" if many else "is no joint here"
+        why = f"is the name of {many} joints: give a path" if many else "is not in the skeleton"
         raise HandNotFoundError(f"map file, [{table}] {role}: '{name}' {why}")
     return joint
 
@@ -70,7 +70,7 @@ def _lookup(rig: NamedJoints, table: str, role: str, name: str) -> int:
 def _amended(hand: HandMap | None, side: Side, named: Mapping[str, int]) -> HandMap:
     if hand is None and not (is_hand(named) and "wrist" in named):
         raise HandNotFoundError(
-            f"map file, [{side}]: names no whole hand (wrist, and MCP and PIP of two fingers)"
+            f"map file, [{side}]: names no complete hand (wrist, and MCP and PIP of two fingers)"
         )
     hand = hand or HandMap(side, named["wrist"], {})
     arm: dict[str, Any] = {r: named[r] for r in ARM_JOINTS if r in named}

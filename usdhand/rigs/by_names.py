@@ -67,7 +67,8 @@ def _character(
     if len(hands) == 1:
         notes.append(f"only a {next(iter(hands))} hand was found")
     if any(m.rank[:-1] == match.rank[:-1] and m.rank[-1] < match.rank[-1] for m in matches):
-        notes.append(f"names are those of {match.convention.name} by the place of the thumb")
+        name = match.convention.name
+        notes.append(f"names are read as those of {name}, by the position of the thumb")
     body = _body(rig, match.body, [h.wrist for h in hands.values()])
     return CharacterMap(hands, match.convention.name, **body, notes=tuple(notes))
 

@@ -184,10 +184,10 @@ def _odd_row(gaps: Array, lengths: Array) -> str:
     if lengths[0] < 0.85 * lengths[-1]:
         return "the fingers get longer away from the thumb"
     if len(lengths) < 3:
-        return "two fingers and a thumb: which fingers they are cannot be told"
+        return "two fingers and a thumb: it is unknown which fingers they are"
     uneven = gaps.max() > 1.5 * gaps.min()
     if len(lengths) == 3 and (uneven or lengths[2] < 0.85 or lengths[0] > 1.02 * lengths[1]):
-        return "of three fingers, which is the missing one cannot be told"
+        return "of three fingers: it is unknown which one is missing"
     return ""
 
 

@@ -148,7 +148,7 @@ def load_conventions(*extra: str | Path | Mapping[str, Mapping[str, Any]]) -> Co
         for name, table in (given if isinstance(given, Mapping) else _read(given)).items():
             where = f"{source}: [{name}]"
             if not isinstance(table, Mapping):
-                raise UsageError(f"{source}: '{name}' stands outside a table; see {_EXAMPLE}")
+                raise UsageError(f"{source}: '{name}' is outside a table; see {_EXAMPLE}")
             if name in (*SIDES, "body"):
                 explicit.setdefault(name, {}).update(_explicit(table, name, where))
             else:
@@ -181,7 +181,7 @@ def _read(path: str | Path) -> Table:
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: is no valid TOML: {error}") from error
+        raise UsageError(f"{path}: is not valid TOML: {error}") from error
     except RecursionError as error:
         raise UsageError(f"{path}: its values are nested too deeply") from error
 
@@ -190,7 +190,7 @@ def _explicit(table: Mapping[str, Any], name: str, where: str) -> dict[str, str]
     allowed = BODY_JOINTS if name == "body" else HAND_ROLES
     for key, value in table.items():
         if key not in allowed:
-            raise UsageError(f"{where} {key}: no such joint; one of {', '.join(allowed)}")
+            raise UsageError(f"{where} {key}: unknown joint; use one of {', '.join(allowed)}")
         if not isinstance(value, str) or not value:
             raise UsageError(f"{where} {key}: must be the name of a joint, not {value!r}")
     return dict(table)
@@ -200,7 +200,7 @@ def _check(table: Mapping[str, Any], where: str) -> None:
     """Refuse a convention whose keys or values are not of the documented form."""
     for key, value in table.items():
         if key not in _KEYS:
-            raise UsageError(f"{where} {key}: unknown key; one of {', '.join(sorted(_KEYS))}")
+            raise UsageError(f"{where} {key}: unknown key; use one of {', '.join(sorted(_KEYS))}")
         if key in ("about", "like"):
             good, form = isinstance(value, str), "a string"
         elif key in ("side", "digit"):

@@ -197,8 +197,9 @@ def palm_of(skeleton: Skeleton, arms: FingerlessArms, side: Side) -> Array:
             forward = end
     if not forward.any():
         raise HandNotFoundError(
-            f"Joint '{skeleton.joints[hand.wrist]}' has no bone before or behind it at the bind "
-            "pose, so the hand has no direction. The bind transforms are probably missing."
+            f"Joint '{skeleton.joints[hand.wrist]}' has no bone before or after it at the bind "
+            "pose, so the direction of the hand is unknown. The bind transforms are probably "
+            "missing."
         )
 
     def across(v: Array) -> Array:

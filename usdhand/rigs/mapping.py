@@ -126,9 +126,10 @@ def _pair(rig: NamedJoints, found: Sequence[FoundHand], notes: list[str]) -> Seq
     ]
     if not same_size:
         places = ", ".join(rig.path(h.wrist) for h in found)
-        raise HandNotFoundError(f"places of different size look like hands: {places}; {ADVICE}")
+        message = f"several places look like hands, but differ in size: {places}"
+        raise HandNotFoundError(f"{message}; {ADVICE}")
     if len(found) > 2:
-        notes.append(f"{len(found)} places look like hands; the two highest of one size were taken")
+        notes.append(f"{len(found)} places look like hands; the two highest of one size are used")
     return max(same_size, key=height)
 
 

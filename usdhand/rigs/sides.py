@@ -34,7 +34,7 @@ def sides_of(rig: NamedJoints, found: Sequence[FoundHand]) -> tuple[list[Side], 
         said = {above[0]: "words above it", shapes[0]: "the hand's shape"}
         said.pop(None, None)
         if len(said) != 1:
-            why = "shape and names disagree" if said else "neither names nor shape say"
+            why = "shape and names disagree" if said else "neither names nor shape tell"
             raise HandNotFoundError(
                 f"a hand was found at {rig.path(found[0].wrist)}, but {why} "
                 f"whether it is left or right; {ADVICE}"

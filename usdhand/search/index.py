@@ -132,7 +132,7 @@ def _code_scale(
     lowest = np.min([low for low, _ in extremes], axis=0).astype(np.float64)
     highest = np.max([high for _, high in extremes], axis=0).astype(np.float64)
     if not (np.all(lowest >= -MAX_FEATURE) and np.all(highest <= MAX_FEATURE)):
-        raise InputError("the library has features that are no numbers or beyond 1e9")
+        raise InputError("the library has features that are not numbers or beyond 1e9")
     origin[: len(lowest)] = lowest
     step[: len(lowest)] = (highest - lowest) / CODES
     return origin, step

@@ -96,7 +96,7 @@ def _checked(segment: ArrayLike, number: int) -> NDArray[np.float32]:
     if not matrix.size:
         raise InputError(f"segment {number} is empty")
     if not np.all(np.abs(matrix) <= MAX_FEATURE):
-        raise InputError(f"segment {number} has features that are no numbers or beyond 1e9")
+        raise InputError(f"segment {number} has features that are not numbers or beyond 1e9")
     return matrix
 
 

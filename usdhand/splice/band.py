@@ -50,7 +50,7 @@ def checked_pins(pins: Sequence[Pin], side: Side, body: float, hand: float) -> t
         for name, time, length in (("body", pin.body, body), ("hand", pin.hand, hand)):
             if not -1e-6 <= time <= length + 1e-6:
                 raise UsageError(
-                    f"Pin {pin} is outside of the {name} clip, which lasts {length:.3f} s "
+                    f"Pin {pin} is outside the {name} clip, which lasts {length:.3f} s "
                     f"from its first frame; the pin is at {time:.3f} s."
                 )
     kept: list[Pin] = []

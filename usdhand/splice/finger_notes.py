@@ -56,11 +56,11 @@ def held_pose_notes(body: Clip, hand_clip: Clip, warps: Mapping[Side, Array]) ->
         after = int(np.searchsorted(warp, hand_clip.duration - 1e-6))
         if before > least:
             at = body.time_code(before - 1)
-            text = f"begins at time code {at:g} of the body, fingers hold its first pose until then"
+            text = f"begins at time code {at:g} of the body; fingers hold its first pose until then"
             held.setdefault(text, []).append(side)
         if len(body) - after > least:
             at = body.time_code(after)
-            text = f"ends at time code {at:g} of the body, fingers hold its last pose from there on"
+            text = f"ends at time code {at:g} of the body; fingers hold its last pose afterwards"
             held.setdefault(text, []).append(side)
     return [
         Problem("held-pose", f"the hand clip {text} ({' and '.join(s)})")

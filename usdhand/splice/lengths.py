@@ -83,7 +83,7 @@ def pin_advice(
     found = locate(ours, theirs) if body_is_longer else locate(theirs, ours)
     if found is None:
         return (
-            "Nothing in the longer clip is like the shorter one: are they of the same "
+            "Nothing in the longer clip resembles the shorter one: are they of the same "
             "performance? Then pin the moments at which the shorter one begins and ends (--pin)."
         )
     ends = (0.0, whole[1 if body_is_longer else 0])
@@ -95,8 +95,8 @@ def pin_advice(
     )
     longer, shorter = ("body", "hand clip") if body_is_longer else ("hand clip", "body")
     return (
-        f"The {shorter} is like the {longer} from {found[0]:.1f} s to {found[1]:.1f} s of it: if "
-        f"that is right, give {options}"
+        f"The {shorter} resembles {found[0]:.1f} s to {found[1]:.1f} s of the {longer}: if that "
+        f"is right, give {options}"
     )
 
 

@@ -71,8 +71,8 @@ def with_wrist(
         wrist = own.character.hands[side].wrist
         if clip.skeleton.parents[wrist] < 0:
             raise UsageError(
-                f"{clip.name}: the {side} wrist, '{clip.skeleton.joints[wrist]}', hangs off no "
-                "forearm, so nothing tells how it bends. Splice the fingers alone (--wrist body)."
+                f"{clip.name}: the {side} wrist, '{clip.skeleton.joints[wrist]}', has no "
+                "forearm, so its bend is unknown. Splice the fingers alone (--wrist body)."
             )
     bends = _palm_to_forearm(hand_clip, hand_hands, side)
     times = _times_within(warp, exact) * hand_clip.fps

@@ -289,7 +289,7 @@ def _aligned_hands(
             if _pins_fix_both_ends(p, *ends)
         }
         if found:
-            message = "no hand moves: the timing is that of the pins, and even between them"
+            message = "no hand moves: the timing is that of the pins, interpolated between them"
             problems.append(Problem("pins-only", message))
     if not found:
         clips = {f"the body {body.name}": 0, f"the hand clip {hand_clip.name}": 1}

@@ -78,7 +78,7 @@ class SpliceSettings:
     """
 
     band: tuple[float, float] = option(
-        "How far the clips' timing may differ in both passes, as shares of the body's length.",
+        "How far the timing may deviate in both passes, as shares of the body's length.",
         default=(0.3, 0.1),
         metavar="FIRST,SECOND",
         read=read_band,
@@ -87,7 +87,7 @@ class SpliceSettings:
     least_band: float = 1.5
     pins: tuple[Pin, ...] = ()
     align: Align = option(
-        "How the clips are turned to each other: by the motion around every frame, or by the "
+        "How the directions of the clips are matched: by the motion around every frame, or by the "
         "trunks.",
         default="local",
     )

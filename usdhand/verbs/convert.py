@@ -252,13 +252,13 @@ def _left_out(hands: Clip, body: Clip, conventions: Conventions | None) -> tuple
     for side in SIDES:
         if (side in theirs) != (side in own):
             without = body if side in theirs else hands
-            message = f"{without.name} has no {side} hand, so that one gets no fingers"
+            message = f"{without.name} has no {side} hand, so this hand gets no fingers"
             found.append(Problem("no-common-hand", message))
     longer = body.duration - hands.duration
     if len(body) > 1 and abs(longer) > 1.5 / hands.fps:
         what = "is cut" if longer > 0 else "holds its last pose"
         message = (
-            f"the result has the time of the hands: the body's motion {what} for the last "
+            f"the result has the length of the hands: the body's motion {what} for the last "
             f"{abs(longer):.2f} s"
         )
         found.append(Problem("other-length", message))

@@ -78,7 +78,7 @@ def measure_library(
                 left.append(
                     Problem(
                         "left-out",
-                        f"the {which} fingers do not move: no truth to meet",
+                        f"the {which} fingers do not move, so there is nothing to compare with",
                         file=clip.name,
                     )
                 )

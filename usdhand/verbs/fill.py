@@ -192,7 +192,7 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
 
 def _read_body(request: FillRequest) -> Clip:
     body = request.body
-    refusal = f"{body} is a motion library; give the clip to be filled, then --library."
+    refusal = f"{body} is a motion library; give the clip to fill, and the library with --library."
     try:
         clip = read_clip(body, request.skel)
     except UsdHandError as error:

@@ -157,6 +157,6 @@ def add_fingers(
         added = fingers_from_library(clip, library, folder, conventions, bare)
     for hand, stubs in finger_stubs(clip, conventions, bare).items():
         what = "thumb" if all("thumb" in name.lower() for name in stubs) else "fingers"
-        message = f"{hand} hand: {listed(stubs)} stays as it is beside the added {what}"
+        message = f"{hand} hand: {listed(stubs)} stays beside the added {what}"
         journal.warn("finger-stub", message)
     return added

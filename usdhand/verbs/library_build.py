@@ -115,7 +115,7 @@ def _previous(request: LibraryBuildRequest, journal: Journal) -> MotionLibrary |
         return read_library(request.output)
     except InputError as error:
         if not is_library(request.output):
-            message = f"{request.output} exists and is no motion library; give another name."
+            message = f"{request.output} exists and is not a motion library; give another name."
             raise OutputError(message) from error
         if not request.rebuild:
             raise
@@ -132,7 +132,7 @@ def _what_is_removed(clips: Sequence[LibraryClip]) -> str:
     edited = [clip for clip in clips if is_edited(clip) or clip.actor]
     if edited:
         words = (f"{x.path}: {x.label}" + (f" ({x.actor})" if x.actor else "") for x in edited)
-        text += "\n  with labels of their own: " + ", ".join(words)
+        text += "\n  with edited labels: " + ", ".join(words)
     return text
 
 
@@ -142,7 +142,7 @@ def _what_is_kept(output: Path) -> str:
     verb = "is" if count == 1 else "are"
     kept = f"{counted(count, 'clip')} read so far {verb} kept" if count else "nothing was read yet"
     old = "; the library is as it was" if output.exists() else ""
-    return f"Interrupted: {kept}{old}. The same command goes on where it stopped."
+    return f"Interrupted: {kept}{old}. The same command continues where this one stopped."
 
 
 class _Terminated(KeyboardInterrupt):
@@ -183,7 +183,7 @@ def _read_labels(path: Path) -> dict[str, tuple[str, str]]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV ({error}).") from error
     if not {"file", "label"} <= columns:
-        raise InputError(f"{path}: needs a head with the columns file and label.")
+        raise InputError(f"{path}: needs a header with the columns file and label.")
     if columns - COLUMNS:
         unknown = ", ".join(sorted(map(str, columns - COLUMNS)))
         raise InputError(f"{path}: unknown columns {unknown}; there are file, label and actor.")

@@ -207,7 +207,7 @@ def _few_shown(lanes: Sequence[Lane]) -> tuple[list[Lane], list[str]]:
     if len(shown) <= MOST_SHOWN:
         return list(lanes), []
     first = shown[:MOST_SHOWN]
-    word = f"the first {MOST_SHOWN} of {len(lanes)} lanes are shown; choose others on the page"
+    word = f"the first {MOST_SHOWN} of {len(lanes)} lanes are shown; select others on the page"
     return [replace(lane, shown=i in first) for i, lane in enumerate(lanes)], [word]
 
 

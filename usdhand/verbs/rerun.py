@@ -23,7 +23,7 @@ def run(request: RerunRequest, journal: Journal) -> Outcome:
     report = _read(request.report_file)
     asked = _changed(from_data(report["request"]), request)
     if isinstance(asked, RerunRequest):
-        raise UsageError(f"{request.report_file}: a rerun is not run again itself.")
+        raise UsageError(f"{request.report_file}: a report of rerun cannot be run again.")
     changed = _changes(report)
     if changed and not request.accept_changes:
         raise InputError(
@@ -42,11 +42,11 @@ def _read(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: this is no JSON report of usdhand.") from error
+        raise InputError(f"{path}: this is not a JSON report of usdhand.") from error
     if not _is_report(report):
         raise InputError(
-            f"{path}: this report holds no request; only reports of usdhand that say what was "
-            "asked for can be run again."
+            f"{path}: this report has no request; only reports of usdhand that have the key "
+            "'request' can be run again."
         )
     found: dict[str, Any] = report
     return found

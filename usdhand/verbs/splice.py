@@ -98,7 +98,7 @@ def parse_pin(text: str, body: Clip, hands: Clip) -> Pin:
         numbers = []
     if len(numbers) not in (2, 3) or not np.isfinite(numbers).all():
         raise UsageError(
-            f"'{text}' is no pin: give BODY:HAND or BODY:HAND:TOLERANCE in time codes, for one "
+            f"'{text}' is not a pin: give BODY:HAND or BODY:HAND:TOLERANCE in time codes, for one "
             "hand with left: or right: before it."
         )
 
@@ -106,7 +106,7 @@ def parse_pin(text: str, body: Clip, hands: Clip) -> Pin:
         since = time_code - clip.origin.first_time_code
         if not -1e-6 <= time_code - clip.time_codes[0] <= np.ptp(clip.time_codes) + 1e-6:
             raise UsageError(
-                f"Pin {text}: {time_code:g} is outside of the {kind} clip, whose time codes are "
+                f"Pin {text}: {time_code:g} is outside the {kind} clip, whose time codes are "
                 f"{clip.time_codes[0]:g} to {clip.time_codes[-1]:g}."
             )
         return since / clip.origin.time_codes_per_second

@@ -76,7 +76,7 @@ def parse_file(path: Path) -> BvhFile:
             f"{found} of {declared}. Export it again, or set 'Frames: {found}' if it ends there."
         )
     if hierarchy.width and found > declared:
-        message = f"the file declares {declared} frames and has {found}: all are read"
+        message = f"the file declares {declared} frames and has {found}; all of them are read"
         problems = (*problems, Problem("more-frames", message))
     return BvhFile(hierarchy, rows, fps, problems)
 
@@ -95,13 +95,13 @@ def _motion_header(data: bytes, position: int, path: Path) -> tuple[int, str, in
     if frames is None:
         fail("no 'Frames:' after MOTION", position)
     if not re.fullmatch(rb"\d{1,18}", frames[1]):
-        fail(f"'{_shown(frames[1])}' is no number of frames", frames.start(1))
+        fail(f"'{_shown(frames[1])}' is not a number of frames", frames.start(1))
     time = _FRAME_TIME.match(data, frames.end())
     if time is None:
         fail("no 'Frame Time:' after 'Frames:'", frames.end())
     seconds = _decimal(time[1])
     if not Decimal(1) / Decimal(FASTEST_FPS) <= seconds <= Decimal(1) / Decimal(SLOWEST_FPS):
-        fail(f"'{_shown(time[1])}' is no usable time of a frame in seconds", time.start(1))
+        fail(f"'{_shown(time[1])}' is not a usable frame time in seconds", time.start(1))
     return int(frames[1]), time[1].decode(), time.end()
 
 

@@ -123,7 +123,7 @@ class _Parser:
     def nodes(self) -> list[Node]:
         """Read all joints."""
         if self.word().upper() != "HIERARCHY":
-            self.fail("this is no BVH file: it does not begin with HIERARCHY")
+            self.fail("this is not a BVH file: it does not begin with HIERARCHY")
         found: list[Node] = []
         stack: list[int] = []
         while True:
@@ -143,15 +143,15 @@ class _Parser:
             elif not word:
                 self.fail("the file ends before MOTION: it is cut off")
             else:
-                place = f"in joint '{found[stack[-1]].name}'" if stack else "outside of a joint"
+                place = f"in joint '{found[stack[-1]].name}'" if stack else "outside any joint"
                 self.fail(f"'{word[:40]}' does not belong here, {place}")
 
     def joint(self, key: str, found: list[Node], stack: list[int]) -> Node:
         """Read a name and the brace behind it."""
         if (key == "ROOT") == bool(stack):
-            self.fail("a ROOT inside of a joint" if stack else f"{key} without a ROOT around it")
+            self.fail("a ROOT inside a joint" if stack else f"{key} without a ROOT around it")
         if len(found) >= MOST_JOINTS or len(stack) >= DEEPEST:
-            self.fail(f"more than {MOST_JOINTS} joints, or {DEEPEST} inside of each other")
+            self.fail(f"more than {MOST_JOINTS} joints, or {DEEPEST} levels of joints")
         place = self.start
         rest = _REST_OF_LINE.match(self.data, self.position)
         assert rest is not None
@@ -170,12 +170,12 @@ class _Parser:
         """Read the number of channels and their names."""
         count = self.number()
         if node.channels or not 0 <= count <= 100 or count != int(count):
-            self.fail(f"the CHANNELS of joint '{node.name}' cannot be meant")
+            self.fail(f"the CHANNELS of joint '{node.name}' are not plausible")
         for _ in range(int(count)):
             word = self.word()
             match = _CHANNEL.fullmatch(word)
             if match is None:
-                self.fail(f"'{word[:40]}' is no channel of joint '{node.name}' ({count:g} follow)")
+                self.fail(f"'{word[:40]}' is not a channel of '{node.name}', which needs {count:g}")
             channel = (match[2].lower(), "xyz".index(match[1].lower()))
             if channel[0] == "position" and channel in node.channels:
                 self.fail(f"joint '{node.name}' has the channel {word} twice")

@@ -79,7 +79,7 @@ def _floats(words: list[bytes], line: re.Match[bytes], frame: int) -> list[float
             text = word[0][:40].decode("latin-1")
             place = line.start() + word.start()
             raise RowError(f"'{text}' is not a usable number", place, frame)
-    raise AssertionError("a line of numbers that cannot be read has a word that is none")
+    raise AssertionError("a line of numbers that cannot be read has a word that is not a number")
 
 
 def _usable(word: bytes) -> bool:

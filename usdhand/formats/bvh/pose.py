@@ -49,13 +49,13 @@ def choose_bind(zero: Clip, clip: Clip) -> tuple[Skeleton, tuple[Problem, ...]]:
     frames = np.flatnonzero(standing(clip))
     if not len(frames):
         message = (
-            "no body stands in the pose of all channels zero, nor in any frame: the zero pose is "
-            "taken for the bind pose all the same, and fingers may be misread"
+            "no body can stand in the pose of all channels zero, nor in any frame: the zero pose "
+            "is used as the bind pose anyway, and fingers may be misread"
         )
         return kept, (Problem("zero-pose", message),)
     first = int(frames[0])
     message = (
-        f"in the pose of all channels zero there stands no body: frame {first + 1} is taken for "
+        f"in the pose of all channels zero no body can stand: frame {first + 1} is used as "
         "the bind pose"
     )
     skeleton = posed_skeleton(

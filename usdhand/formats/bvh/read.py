@@ -130,8 +130,8 @@ def _check_size(path: Path, hierarchy: Hierarchy, frames: int) -> None:
     joints = len(hierarchy.joints)
     if joints * frames > PLENTY and joints > STILL_JOINTS * hierarchy.width:
         raise InputError(
-            f"{path}: {joints} joints with {hierarchy.width} channels in {frames} frames cannot be "
-            "meant."
+            f"{path}: {joints} joints with {hierarchy.width} channels in {frames} frames are not "
+            "plausible."
         )
 
 
@@ -184,6 +184,6 @@ def _channel_problems(hierarchy: Hierarchy, translations: Array) -> Iterator[Pro
             if usual < NEAR_ZERO * offsets[joint]:
                 message = (
                     "the positions stay near zero, far from the OFFSET that they replace: the "
-                    "program that wrote them may have meant them to be added to it"
+                    "program that wrote them may have meant them as additions to it"
                 )
                 yield Problem("near-zero-positions", message, hierarchy.joints[joint])

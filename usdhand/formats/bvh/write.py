@@ -234,7 +234,7 @@ def _problems(clip: Clip, layout: _Layout, renamed: int) -> Iterator[Problem]:
         )
         yield Problem("moving-joints", message, clip.skeleton.joints[moving[0]], "note")
     if renamed:
-        message = f"{renamed} joints are renamed: names in the file have no blanks and differ"
+        message = f"{renamed} joints are renamed: names in the file have no spaces and are unique"
         yield Problem("renamed-joints", message, severity="note")
     if abs(clip.start) > 1e-9:
         message = f"BVH has no start time: the clip began at {clip.start:g} s and begins at 0"

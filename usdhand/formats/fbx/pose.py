@@ -183,5 +183,5 @@ def _inverse(linear: Array) -> Array:
 def _shear_problem(scene: Scene, node: int) -> tuple[Problem, ...]:
     if node < 0:
         return ()
-    message = "uneven scales shear the axes of joints: positions are kept, shear is left out"
+    message = "non-uniform scales shear the axes of joints: positions are kept, shear is ignored"
     return (Problem("sheared", message, scene.names[node]),)

@@ -96,7 +96,7 @@ def _meant(scene: Scene, reading: Reading) -> Scene:
     """The scene with the units and axes that the user says."""
     unit = scene.cm_per_unit if reading.cm_per_unit is None else reading.cm_per_unit
     if not 1e-6 < unit < 1e9:
-        raise InputError(f"{scene.path}: one unit is {unit:g} cm, which cannot be meant.")
+        raise InputError(f"{scene.path}: one unit is {unit:g} cm, which is not plausible.")
     axes = scene.axes if reading.up is None else to_y_up(reading.up)
     says_axes = scene.says_axes or reading.up is not None
     return right_handed(replace(scene, cm_per_unit=unit, says_axes=says_axes), axes)
@@ -124,9 +124,9 @@ def _origin(scene: Scene, rig: FbxSkeleton) -> Origin:
 
 def _scene_problems(scene: Scene, rig: FbxSkeleton) -> Iterator[Problem]:
     if not scene.says_axes:
-        yield Problem("guessed-up-axis", "the file does not say which axis is up: Y is taken")
+        yield Problem("guessed-up-axis", "the file does not say which axis is up: Y is assumed")
     if scene.bind.keys().isdisjoint(rig.nodes):
-        message = "the file has no bind pose: the nodes' own transforms stand in for it"
+        message = "the file has no bind pose: the transforms of the nodes are used instead"
         yield Problem("missing-bind", message, severity="note")
 
 
@@ -134,20 +134,20 @@ def _time_problems(scene: Scene, rig: FbxSkeleton, sampled: Sampled) -> Iterator
     take = sampled.take
     still = sum(node not in take.moved for node in rig.nodes)
     if still:
-        message = f"{still} joints are not animated and stay at rest"
+        message = f"{still} joints are not animated and keep their rest transform"
         yield Problem("fewer-joints", message, take.name, "note")
     if sampled.by_keys:
         message = (
-            f"the animation is said to last from {take.begin:g} to {take.end:g} s, but its keys "
-            f"from {take.first_key:g} to {take.last_key:g} s: the keys are followed"
+            f"the animation should last from {take.begin:g} to {take.end:g} s, but its keys "
+            f"from {take.first_key:g} to {take.last_key:g} s: the times of the keys are used"
         )
         yield Problem("take-span", message, take.name)
     if scene.fps is None:
-        message = f"the file does not say its frame rate: {sampled.fps:g} is taken from its keys"
+        message = f"the file does not say its frame rate: {sampled.fps:g} is derived from its keys"
         yield Problem("guessed-fps", message, take.name)
     elif take.key_spacing > 0 and take.key_spacing * sampled.fps < 0.75:
         message = (
             f"keys are {1 / take.key_spacing:.4g} a second, but the file plays {sampled.fps:g} "
-            "frames a second: keys between frames are passed over"
+            "frames a second: keys between frames are skipped"
         )
         yield Problem("dense-keys", message, take.name)

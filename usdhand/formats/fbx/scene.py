@@ -184,7 +184,7 @@ def _scene(path: Path, said: dict[str, Any], numbers: Array) -> Scene:
     bind = {i: _matrix(m) for i, m in (*said["poses"], *said["clusters"])}
     axes = _axes(said["axes"])
     if not _finite(rest):
-        raise InputError(f"{path}: not-a-number in the transforms of its nodes.")
+        raise InputError(f"{path}: the transforms of its nodes have values that are not numbers.")
     return Scene(
         path=path,
         names=tuple(n["name"] for n in nodes),
@@ -235,7 +235,7 @@ def _sampled(
     values[:, moved] = found
     transforms = _transforms(values)
     if not _finite(transforms):
-        raise InputError(f"{path}: not-a-number in the animation '{take.name}'.")
+        raise InputError(f"{path}: values that are not numbers in the animation '{take.name}'.")
     return Sampled(take, sampled["fps"], sampled["first"], sampled["by_keys"], transforms)
 
 

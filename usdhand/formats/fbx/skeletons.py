@@ -118,7 +118,7 @@ def _joint_nodes(scene: Scene, moved: frozenset[int]) -> tuple[frozenset[int], t
             if int(scene.parents[node]) in carried:
                 carried.add(node)
         bones = nulls & carried or nulls
-        message = "the file has no limb nodes: its null objects are read as joints"
+        message = "the file has no limb nodes: null objects are read as joints"
         problems = (Problem("no-limbs", message, severity="note"),)
     bones.discard(0)
     if not bones:
@@ -186,4 +186,4 @@ def _emptiness(scene: Scene) -> str:
     """What to add where a file seems empty, which files of unknown versions do."""
     if len(scene.names) > 1:
         return ""
-    return f", for there is nothing in it that is known of FBX version {scene.version / 1000:g}"
+    return f", because nothing in it is known of FBX version {scene.version / 1000:g}"

@@ -48,7 +48,7 @@ def read_rows(document: Document, accessor: Element, kind: str, least: int = 1) 
     bad = ~(np.abs(rows) <= LARGEST)
     if bad.any():
         row = int(np.argmax(bad.any(axis=1)))
-        accessor.refuse(f"holds {rows[row][bad[row]][0]:g} in row {row}, which cannot be meant")
+        accessor.refuse(f"holds {rows[row][bad[row]][0]:g} in row {row}, which is not plausible")
     return rows
 
 
@@ -56,7 +56,7 @@ def _dtype(accessor: Element) -> np.dtype[Any]:
     component = accessor.need("componentType")
     code = component.whole()
     if code not in TYPES:
-        component.refuse(f"is {str(code)[:20]}, which is no component type")
+        component.refuse(f"is {str(code)[:20]}, which is not a component type")
     return np.dtype(TYPES[code]).newbyteorder("<")
 
 
@@ -100,7 +100,7 @@ def _with_sparse(document: Document, sparse: Element, dense: NDArray[Any]) -> ND
     places, values = sparse.need("indices"), sparse.need("values")
     dtype = _dtype(places)
     if dtype.kind != "u":
-        places.refuse("has indices that are no unsigned integers")
+        places.refuse("has indices that are not unsigned integers")
     indices = _view(document, places, dtype, count, 1)[:, 0]
     if int(indices.max()) >= len(dense):
         places.refuse(f"names row {int(indices.max())} of {len(dense)}")

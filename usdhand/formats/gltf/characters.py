@@ -94,7 +94,7 @@ def read_skins(document: Document, tree: Tree) -> list[GltfSkin]:
     found: list[GltfSkin] = []
     together = 0
     if len(document.lists["skins"]) > MOST_SKINS:
-        document.json.refuse(f"has more than {MOST_SKINS} skins, which cannot be meant")
+        document.json.refuse(f"has more than {MOST_SKINS} skins, which is not plausible")
     wearing: dict[int, tuple[int, ...]] = {}
     for node, wearer in enumerate(tree.elements):
         skin = wearer.reference("skin", len(document.lists["skins"]))
@@ -166,7 +166,7 @@ def _character(
             _drop_leading(tree, int(root), joints, wanted)
     nodes = tuple(node for node in within if node in joints)
     if len(nodes) > MOST_JOINTS:
-        tree.elements[nodes[0]].refuse(f"is above {len(nodes)} joints, which cannot be meant")
+        tree.elements[nodes[0]].refuse(f"is above {len(nodes)} joints, which is not plausible")
     named = [skin.element.text("name") for skin in skins]
     holders = (top, int(tree.parents[nodes[0]]), nodes[0])
     named += [tree.name(node) for node in holders if node >= 0]

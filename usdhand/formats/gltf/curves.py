@@ -113,7 +113,7 @@ def read_curves(
         if path not in KINDS or node is None or node not in nodes:
             continue
         if (node, path) in curves:
-            message = f"a second curve for the {path} of one node is not read"
+            message = f"a second curve for the {path} of the same node is not read"
             problems.setdefault("double", Problem("double-channel", message, channel.where))
             continue
         sampler = samplers[channel.need("sampler").whole(0, len(samplers))]
@@ -144,7 +144,7 @@ def evaluate(curve: KeyCurve, keys: Array, frames: int, path: str) -> Array:
         return found
     length = np.linalg.norm(found, axis=1, keepdims=True)
     if length.min() < SHORTEST:
-        raise InputError(f"{curve.where} turns through a quaternion of no length.")
+        raise InputError(f"{curve.where} passes through a quaternion of length zero.")
     return rot.make_continuous(found / length)
 
 
@@ -191,7 +191,7 @@ def _curve(
     times = found[:, 0]
     if (np.diff(times) < 0).any():
         key = int(np.argmax(np.diff(times) < 0)) + 1
-        element.refuse(f"has key times that go back, at key {key} ({times[key]:g} s)")
+        element.refuse(f"has key times that decrease, at key {key} ({times[key]:g} s)")
     values, element = read("output", KINDS[path])
     each = 3 if interpolation == "CUBICSPLINE" else 1
     if len(values) != each * len(times):
@@ -202,7 +202,7 @@ def _curve(
     if path == "rotation":
         short = np.linalg.norm(main, axis=1) < SHORTEST
         if short.any():
-            element.refuse(f"holds a quaternion of no length at key {int(np.argmax(short))}")
+            element.refuse(f"holds a quaternion of length zero at key {int(np.argmax(short))}")
         if interpolation == "LINEAR":
             values = rot.normalize(values)
     return KeyCurve(times, values, interpolation, f"{document.path}: {sampler.where}")

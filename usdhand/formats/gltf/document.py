@@ -43,7 +43,7 @@ class Element:
     def get(self, key: str) -> Element | None:
         """Return a member of this object, None where it is absent."""
         if not isinstance(self.value, dict):
-            self.refuse("is no JSON object")
+            self.refuse("is not a JSON object")
         if self.value.get(key) is None:
             return None
         return Element(self.file, self.value[key], f"{self.where}.{key}" if self.where else key)
@@ -70,13 +70,13 @@ class Element:
     def elements(self) -> list[Element]:
         """Elements of this list."""
         if not isinstance(self.value, list):
-            self.refuse("is no JSON list")
+            self.refuse("is not a JSON list")
         return [Element(self.file, v, f"{self.where}[{i}]") for i, v in enumerate(self.value)]
 
     def members(self) -> Iterator[tuple[str, Element]]:
         """Keys and values of this object."""
         if not isinstance(self.value, dict):
-            self.refuse("is no JSON object")
+            self.refuse("is not a JSON object")
         for key in self.value:
             if (found := self.get(key)) is not None:
                 yield key, found
@@ -88,9 +88,9 @@ class Element:
         if isinstance(value, float) and value.is_integer():
             value = int(value)
         if not isinstance(value, int) or isinstance(value, bool):
-            self.refuse("is no whole number")
+            self.refuse("is not a whole number")
         if value < least:
-            self.refuse(f"is {_short(value)}; the least there can be is {least}")
+            self.refuse(f"is {_short(value)}; it must be at least {least}")
         if below is not None and value >= below:
             self.refuse(f"is {_short(value)}, but there are only {below}")
         return value
@@ -116,9 +116,9 @@ class Element:
         """Return this as a finite number of sensible size."""
         value = self.value
         if not isinstance(value, (int, float)) or isinstance(value, bool):
-            self.refuse("is no number")
+            self.refuse("is not a number")
         if not (math.isfinite(value) if isinstance(value, float) else True) or abs(value) > LARGEST:
-            self.refuse(f"is {_short(value)}, which cannot be meant")
+            self.refuse(f"is {_short(value)}, which is not plausible")
         return float(value)
 
     def text(self, key: str) -> str:
@@ -127,7 +127,7 @@ class Element:
         if found is None:
             return ""
         if not isinstance(found.value, str):
-            found.refuse("is no text")
+            found.refuse("is not a text")
         return found.value.encode("utf-8", "replace").decode()  # no lone surrogates
 
 
@@ -176,7 +176,7 @@ class Document:
 
     def _beside(self, buffer: Element, uri: str, size: int) -> bytes:
         if ":" in uri.split("/")[0] or uri.startswith(("/", "\\")):
-            buffer.refuse(f"names {_quoted(uri)}, which is no file beside it")
+            buffer.refuse(f"names {_quoted(uri)}, which is not a file beside it")
         path = self.path.parent / unquote(uri)
         try:
             if not path.is_file():
@@ -231,9 +231,9 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, int, bytes | None]:
     while at + 8 <= length:
         size, kind = struct.unpack_from("<II", data, at)
         if at + 8 + size > length:
-            raise InputError(f"{path}: the chunk at byte {at} has {size} bytes, more than follow.")
+            raise InputError(f"{path}: the chunk at byte {at} has {size} bytes, but fewer follow.")
         if at == 12 and kind != JSON_CHUNK:
-            raise InputError(f"{path}: the first chunk (byte 12) is no JSON.")
+            raise InputError(f"{path}: the first chunk (byte 12) is not JSON.")
         if kind not in found:
             found[kind] = data[at + 8 : at + 8 + size]
             start = at + 8 if kind == JSON_CHUNK else start
@@ -245,21 +245,21 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, int, bytes | None]:
 
 def _parsed(path: Path, data: bytes, start: int) -> Any:
     def constant(name: str) -> NoReturn:
-        raise InputError(f"{path}: its JSON holds {name}, which is no JSON number.")
+        raise InputError(f"{path}: its JSON holds {name}, which is not a JSON number.")
 
     try:
         value = json.loads(data.decode("utf-8-sig"), parse_constant=constant)
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is no glTF: no text at byte {start + error.start}.") from error
+        raise InputError(f"{path}: is not glTF: no text at byte {start + error.start}.") from error
     except json.JSONDecodeError as error:
         place = f"byte {start + error.pos}" if start else f"line {error.lineno}:{error.colno}"
-        raise InputError(f"{path}: is no glTF: {error.msg} at {place} of its JSON.") from error
+        raise InputError(f"{path}: is not glTF: {error.msg} at {place} of its JSON.") from error
     except (RecursionError, ValueError) as error:
         raise InputError(
-            f"{path}: its JSON is nested too deeply or has endless numbers."
+            f"{path}: its JSON is nested too deeply or has numbers that are too long."
         ) from error
     if not isinstance(value, dict):
-        raise InputError(f"{path}: is no glTF: its JSON is no object.")
+        raise InputError(f"{path}: is not glTF: its JSON is not an object.")
     return value
 
 
@@ -272,7 +272,7 @@ def _data_uri(buffer: Element, uri: str) -> bytes:
     try:
         return base64.b64decode(body, validate=True)
     except (binascii.Error, ValueError) as error:
-        return buffer.refuse(f"has a uri that is no base64 ({error})")
+        return buffer.refuse(f"has a uri that is not base64 ({error})")
 
 
 def _short(value: float) -> str:

@@ -52,7 +52,7 @@ class Tree:
                 world[node] = world[parent] @ world[node]
                 # Products of sane numbers may still overflow, along the tree.
                 if not (np.abs(world[node]) <= LARGEST).all():
-                    self.elements[node].refuse("stands beyond any sensible distance or scale")
+                    self.elements[node].refuse("is beyond any plausible distance or scale")
         return world
 
     def name(self, node: int) -> str:
@@ -122,7 +122,7 @@ def read_tree(document: Document) -> Tree:
         order.append(node)
         depth[node] = depth[parents[node]] + 1 if parents[node] >= 0 else 1
         if depth[node] > MOST_DEEP:
-            elements[node].refuse(f"stands below {MOST_DEEP} others, which cannot be meant")
+            elements[node].refuse(f"is below {MOST_DEEP} others, which is not plausible")
         waiting += reversed(children[node])
     if len(order) < len(elements):
         lost = min(set(range(len(elements))) - set(order))
@@ -148,6 +148,6 @@ def _transforms(elements: list[Element]) -> tuple[Array, Array, Array]:
             rotations[i] = found.numbers(4)
             length = float(np.linalg.norm(rotations[i]))
             if length < SHORTEST:
-                found.refuse("has no length, so it is no rotation")
+                found.refuse("has length zero, so it is not a rotation")
             rotations[i] /= length
     return translations, rotations, scales

@@ -119,12 +119,12 @@ def find_placement(
                 problems |= {problem.code: problem for problem in odd}
             above = chains[top]
             if "zero-scale" in problems:
-                tree.elements[nodes[joint]].refuse("stands below a zero scale")
+                tree.elements[nodes[joint]].refuse("is below a zero scale")
             lengths[joint] = float(mean_scale(above[0, :3, :3])) * space.unit
             rotations[joint] = space.axes @ nearest_rotation(above[:, :3, :3])
             translations[joint] = above[:, :3, 3] @ space.axes.T * space.unit
         if not lengths[joint] * growth[joint] <= LARGEST:
-            tree.elements[nodes[joint]].refuse("stands below too large a scale")
+            tree.elements[nodes[joint]].refuse("is below a scale that is too large")
     return JointSpace(lengths, folded, rotations, translations), tuple(problems.values())
 
 
@@ -156,7 +156,7 @@ def _chain(tree: Tree, joint: int, motion: Motion) -> Array:
     for place in range(len(above)):
         result = result @ compose_trs(t[:, place], q[:, place], s[:, place])
     if not (np.abs(result) <= LARGEST).all():
-        tree.elements[joint].refuse("stands beyond any sensible distance or scale")
+        tree.elements[joint].refuse("is beyond any plausible distance or scale")
     return np.asarray(result)
 
 

@@ -24,7 +24,7 @@ def bind_matrices(
     """Joint-to-world matrices (joints, 4, 4) of the bind pose in file units, without scale.
 
     Joints of no skin stand to the joint above them as in the default pose of the nodes, which
-    stands in for the bind pose where there is no skin or where skins contradict each other.
+    is used as the bind pose where there is no skin or where skins contradict each other.
     """
     default = _without_scale(tree.world[list(character.nodes)])
     place = {node: joint for joint, node in enumerate(character.nodes)}
@@ -38,9 +38,9 @@ def bind_matrices(
         if bind is None:
             absent = skin.element.get("inverseBindMatrices") is None
             message = (
-                "there are no inverse bind matrices: the default pose stands in for the bind pose"
+                "there are no inverse bind matrices: the default pose is used as the bind pose"
                 if absent
-                else "the inverse bind matrices make no pose of these bones: they are not used"
+                else "the inverse bind matrices are not a pose of these bones; they are not used"
             )
             problems.append(Problem("missing-bind", message, where))
             continue
@@ -53,7 +53,7 @@ def bind_matrices(
         if apart:
             message = (
                 f"two skins bind the joint {tree.name(apart[0])!r} at different places: the "
-                "default pose of the nodes stands in for the bind pose"
+                "default pose of the nodes is used as the bind pose"
             )
             return default, (*problems, Problem("bind-disagrees", message, where))
         for joint, own in bind.items():

@@ -137,7 +137,7 @@ def _animated(scene: _GltfScene) -> Clip:
         )
     if timing.count * len(nodes) > MOST_VALUES:
         raise InputError(
-            f"{document.path}: {timing.count} frames of {len(nodes)} joints cannot be meant. "
+            f"{document.path}: {timing.count} frames of {len(nodes)} joints are not plausible. "
             "Check the key times."
         )
     motion = Motion(curves, timing)
@@ -215,8 +215,8 @@ def _guess(timing: Timing) -> str:
     fps = f"{timing.fps:g} frames a second"
     return {
         "steady": "",
-        "one key": f"one key tells no frame rate: {fps} are assumed",
+        "one key": f"one key does not define a frame rate: {fps} are assumed",
         "rounded": f"key times are rounded: read as {fps}",
-        "sparse": f"keys are sparse: read at {fps}, on which all of them lie",
-        "uneven": f"{len(timing.keys)} key times lie on no steady frame rate: resampled at {fps}",
+        "sparse": f"keys are sparse: read at {fps}, which fits all of them",
+        "uneven": f"{len(timing.keys)} key times do not fit any frame rate: resampled at {fps}",
     }[timing.rhythm]

@@ -53,7 +53,8 @@ def write_clip(clip: Clip, path: Path) -> tuple[Problem, ...]:
     """
     for values in (clip.rotations, clip.translations, clip.scales, clip.skeleton.bind):
         if not np.isfinite(values).all():
-            raise InputError(f"{clip.origin.path or clip.name}: the motion has not-a-numbers.")
+            name = clip.origin.path or clip.name
+            raise InputError(f"{name}: the motion has values that are not numbers.")
     times, problems = _times(clip)
     numbers = _Numbers()
     rest = _rest(clip.skeleton)
@@ -149,7 +150,7 @@ def _times(clip: Clip) -> tuple[Array, tuple[Problem, ...]]:
     times = clip.start + frames
     if times[0] >= 0 and _survive(times, clip.fps):
         return times, ()
-    reason = "begin before zero" if times[0] < 0 else "lose frames that late"
+    reason = "be negative" if times[0] < 0 else "be exact that late"
     message = f"the clip starts at {clip.start:g} s; glTF times cannot {reason}: written from 0 s"
     problems = [Problem("start-time", message, clip.name)]
     if not _survive(frames, clip.fps):

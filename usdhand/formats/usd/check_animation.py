@@ -37,19 +37,19 @@ def _binding_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
     if not targets:
         yield Problem("no-animation", "no animation is bound to the skeleton", where, "warning")
     elif not (bound := skeleton.GetStage().GetPrimAtPath(targets[0])):
-        yield Problem("no-such-animation", f"{targets[0]} is bound, but not there", where, "error")
+        message = f"{targets[0]} is bound, but does not exist"
+        yield Problem("no-such-animation", message, where, "error")
     elif not bound.IsA(UsdSkel.Animation):
-        yield Problem(
-            "no-such-animation", f"{targets[0]} is bound, but no SkelAnimation", where, "error"
-        )
+        message = f"{targets[0]} is bound, but is not a SkelAnimation"
+        yield Problem("no-such-animation", message, where, "error")
     prim = owner.GetParent()
     while prim and not prim.IsPseudoRoot():
         overruled = UsdSkel.BindingAPI(prim).GetAnimationSourceRel()
         if overruled and overruled.GetTargets() not in ([], targets):
             yield Problem(
                 "lost-binding",
-                f"binds {overruled.GetTargets()[0]}, but the binding on {where} below wins: "
-                "override it there",
+                f"binds {overruled.GetTargets()[0]}, but the binding on {where} below has "
+                "priority: override it there",
                 str(prim.GetPath()),
                 "warning",
             )
@@ -183,7 +183,7 @@ def _number_rules(
     zero = norms < UNIT_TOLERANCE
     yield Problem("zero-quaternion", "zero-length quaternion", where, "error"), zero
     long = ~zero & (np.abs(norms - 1.0) > UNIT_TOLERANCE)
-    message = "quaternion of another length than one"
+    message = "the length of a quaternion is not one"
     yield Problem("non-unit-quaternion", message, where, "error"), long
     flips = np.zeros(norms.shape, dtype=bool)
     flips[1:] = np.einsum("tji,tji->tj", values[1:], values[:-1]) < 0

@@ -54,7 +54,7 @@ def _name_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
         renamed = [f"'{name}' to '{legal_name(name)}'" for name in illegal]
         yield Problem(
             "illegal-joint-name",
-            f"{len(illegal)} joint names are no legal prim names: USD then sees no hierarchy and "
+            f"{len(illegal)} joint names are not legal prim names: USD then sees no hierarchy and "
             f"Blender makes no bones. Rename {some(renamed)}",
             where,
             "error",
@@ -102,7 +102,7 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
             message = f"{len(matrices)} {name} transforms for {len(joints)} joints"
             yield replace(other_length, message=message)
         elif singular := [joints[int(j)] for j in np.flatnonzero(~_usable(matrices))]:
-            message = f"{len(singular)} {name} transforms are singular or no numbers"
+            message = f"{len(singular)} {name} transforms are singular or not numbers"
             yield replace(bad, message=f"{message}: {some(singular)}")
         else:
             poses[name] = matrices

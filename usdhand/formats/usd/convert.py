@@ -183,7 +183,10 @@ def _opinions(stage: Usd.Stage, skeleton: Sdf.Path) -> list[tuple[str, str]]:
 
 
 def _one_motion(path: Sdf.Path, name: str, selection: str) -> Problem:
-    message = f"only the motion of variant '{selection}' of '{name}' is kept: it is written anew"
+    message = (
+        f"only the motion of variant '{selection}' of '{name}' is kept, since the motion is "
+        "rewritten"
+    )
     return Problem("variants", message, str(path))
 
 

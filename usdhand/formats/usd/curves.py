@@ -144,7 +144,7 @@ def frame_timing(stage: Usd.Stage, samples: list[Array]) -> tuple[Timing, tuple[
     per_second, said = stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()
     if not all(np.isfinite(times).all() for times in samples) or not 0 < per_second < np.inf:
         raise InputError(
-            f"{where}: its time codes are no times, at {per_second:g} time codes a second. Export "
+            f"{where}: its time codes are not times, at {per_second:g} time codes a second. Export "
             "the animation again."
         )
     if per_second <= FASTEST_TIME_CODES:
@@ -162,7 +162,7 @@ def frame_timing(stage: Usd.Stage, samples: list[Array]) -> tuple[Timing, tuple[
         )
     problem = Problem(
         "resampled",
-        f"{count} samples are not a steady sequence of frames: read every {timing.step:g} time "
+        f"{count} samples are not evenly spaced: read every {timing.step:g} time "
         "codes, interpolated as USD does",
     )
     return timing, (problem,)

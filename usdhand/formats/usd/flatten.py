@@ -33,7 +33,7 @@ def flat_layer(stage: Usd.Stage) -> tuple[Sdf.Layer, tuple[Problem, ...]]:
             flat = _Embedding(stage).layer if names else _flattened(stage)
         except _NoEmbeddingError as reason:
             flat = _flattened(stage)
-            message = f"variant sets are kept as they are selected only, since {reason}"
+            message = f"only the selected variants are kept, since {reason}"
             lost = (Problem("variants", message, ", ".join(names)),)
     for layer in reversed(stage.GetLayerStack()):
         flat.comment = layer.comment or flat.comment
@@ -156,7 +156,7 @@ class _Embedding:
                 targets = prop.GetTargets() if related else prop.GetConnections()
                 if found := [t for t in targets if any(t.HasPrefix(root) for root in roots)]:
                     if prim.IsInstanceProxy():
-                        raise _NoEmbeddingError(f"{prop.GetPath()} leads out of its file")
+                        raise _NoEmbeddingError(f"{prop.GetPath()} leaves its file")
                     strays.append((prop, found))
         for prop, found in strays:
             spec = _local_spec(self.layer, prop)

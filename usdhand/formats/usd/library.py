@@ -117,12 +117,12 @@ def read_library(path: str | Path) -> MotionLibrary:
     if version != VERSION:
         if version is None:
             raise InputError(
-                f"{path} is no motion library; "
+                f"{path} is not a motion library; "
                 "'usdhand library build CLIP... -o LIBRARY' makes one."
             )
         raise InputError(
-            f"{path} is a library of version {version}, this is for version {VERSION}; "
-            f"'usdhand library build CLIP... -o {path} --rebuild' makes it anew."
+            f"{path} is a library of version {version}, but version {VERSION} is needed; "
+            f"'usdhand library build CLIP... -o {path} --rebuild' builds it again."
         )
     clips: list[LibraryClip] = []
     damaged: list[Problem] = []
@@ -136,7 +136,7 @@ def read_library(path: str | Path) -> MotionLibrary:
         raise InputError(
             f"{path}: none of its {len(damaged)} clips can be used ({damaged[0].file}: "
             f"{damaged[0].message}); "
-            f"'usdhand library build CLIP... -o {path} --rebuild' makes it anew."
+            f"'usdhand library build CLIP... -o {path} --rebuild' builds it again."
         )
     left = stage.GetPrimAtPath(LEFT_OUT)
     left_out = [
@@ -275,17 +275,17 @@ def _read_hand(side: Side, need: Callable[[str], Any]) -> LibraryHand:
     segments = np.array(need(f"{side}:segments"), dtype=np.intp).reshape(-1, 2)
     known = joints and set(joints) <= set(HAND_JOINTS) and len(set(joints)) == len(joints)
     if not known or not arm.size or arm.size % ARM_WIDTH:
-        raise _DamagedError(f"its {side} arrays do not fit")
+        raise _DamagedError(f"its {side} arrays have the wrong length")
     arm, width = arm.reshape(-1, ARM_WIDTH), 3 * len(joints)
     if not fingers.size or fingers.size % width:
-        raise _DamagedError(f"its {side} arrays do not fit")
+        raise _DamagedError(f"its {side} arrays have the wrong length")
     if not (np.isfinite(arm).all() and np.isfinite(fingers).all()):
-        raise _DamagedError(f"its {side} arrays have values that are no numbers")
+        raise _DamagedError(f"its {side} arrays have values that are not numbers")
     if reason := damage(arm, fingers):
         raise _DamagedError(f"{side} hand: {reason}")
     inside = (segments >= 0) & (segments < len(arm))
     if not inside.all() or (segments[:, 0] >= segments[:, 1]).any():
-        raise _DamagedError(f"its {side} segments do not fit")
+        raise _DamagedError(f"its {side} segments are outside the motion")
     return LibraryHand(
         unpack_arm(arm),
         joints,

@@ -46,7 +46,7 @@ def authored_poses(
     rest = _matrices(skeleton.GetRestTransformsAttr().Get(), joints, scale)
     bind = _matrices(skeleton.GetBindTransformsAttr().Get(), joints, scale)
     where = str(character.skeleton.GetPath())
-    unusable = "transforms are missing or do not fit the joints"
+    unusable = "transforms are missing or have the wrong number"
     problems = []
     if bind is None:
         problems.append(Problem("missing-bind", f"bind {unusable}", where))

@@ -115,7 +115,7 @@ def _animated_clip(character: Character) -> Clip:
     )
     if not SLOWEST_FPS <= timing.fps <= FASTEST_FPS:
         raise InputError(
-            f"{character.path}: {timing.fps:g} frames a second cannot be meant; check "
+            f"{character.path}: {timing.fps:g} frames a second are not plausible; check "
             f"timeCodesPerSecond ({origin.time_codes_per_second:g})."
         )
     name = character.path.stem
@@ -208,7 +208,7 @@ def _animation_problems(
         yield Problem("unknown-joints", message, where)
     still = len(joints) - len(np.unique(targets[targets >= 0]))
     if still:
-        message = f"{still} joints are not animated and stay at rest"
+        message = f"{still} joints are not animated and keep their rest transform"
         yield Problem("fewer-joints", message, where, "note")
     so = "so USD shows the rest pose; the rotations are read all the same"
     if tracks.translations is None:
@@ -221,7 +221,7 @@ def _name_problems(character: Character, joints: tuple[str, ...]) -> Iterator[Pr
     illegal = illegal_names(joints)
     if illegal:
         message = (
-            f"{len(illegal)} joint names are no legal USD names, e.g. '{illegal[0]}': other "
+            f"{len(illegal)} joint names are not legal in USD, e.g. '{illegal[0]}': other "
             f"programs may lose these joints; '{legal_name(illegal[0])}' would be legal"
         )
         yield Problem("illegal-joint-name", message, str(character.skeleton.GetPath()))

@@ -134,7 +134,7 @@ def read_stored_rig(path: str | Path, skel: str | None = None) -> StoredRig:
         rig = _relations(prim, path)
         found = _skeleton_path(prim)
         if found is None:
-            raise InputError(f"{path}: the skeleton of the rig {prim.GetPath()} is not there.")
+            raise InputError(f"{path}: the skeleton of the rig {prim.GetPath()} does not exist.")
         skeleton = stage.GetPrimAtPath(found)
         character = Character(stage, path, skeleton, bound_animation(skeleton), problems)
         clip = clip_from_character(character)
@@ -166,7 +166,9 @@ def find_rig(stage: Usd.Stage, path: Path, skel: str | None = None) -> Usd.Prim:
         of = f" for the skeleton '{skel}'" if skel else ""
         raise InputError(f"{path}: no hand rig{of} on this stage; 'usdhand reduce' writes one.")
     names = ", ".join(f"{r.GetPath()} (of {_skeleton_path(r)})" for r in rigs)
-    raise InputError(f"{path}: more than one hand rig; choose a skeleton with --skel: {names}.")
+    raise InputError(
+        f"{path}: there are several hand rigs; choose one by its skeleton with --skel: {names}."
+    )
 
 
 def rig_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
@@ -183,7 +185,7 @@ def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Problem]:
         if skeleton is None:
             yield Problem("rig-skeleton", "the rig's skeleton is not on the stage", where, "error")
         elif skeleton in seen:
-            message = f"{seen[skeleton]} is a rig of the same skeleton: one must be deactivated"
+            message = f"{seen[skeleton]} is a rig of the same skeleton; deactivate one of them"
             yield Problem("second-rig", message, where, "error")
         seen[skeleton] = where
         try:
@@ -291,7 +293,7 @@ def _number(prim: Usd.Prim, channel: str, name: str, path: Path) -> float:
     value = _value(prim, channel, name, path)
     if not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
         raise InputError(
-            f"{path}: '{name}' of channel '{channel}' is {value!r}, which is no sensible number."
+            f"{path}: '{name}' of channel '{channel}' is {value!r}, which is not plausible."
         )
     return float(value)
 
@@ -305,7 +307,7 @@ def _curve(prim: Usd.Prim, name: str, times: Array, path: Path) -> Array:
         return np.full(len(times), _number(prim, name, "value", path))
     values = [query.Get(t) for t in sampled]
     if not all(isinstance(v, (int, float)) and abs(v) <= LARGEST for v in values):
-        raise InputError(f"{path}: the curve of channel '{name}' has values that are no angles.")
+        raise InputError(f"{path}: the curve of channel '{name}' has values that are not angles.")
     return np.interp(times, sampled, np.array(values, dtype=np.float64))
 
 
@@ -334,7 +336,7 @@ def _stored_frames(prim: Usd.Prim, path: Path) -> dict[Side, StoredFrames]:
             if not fits or np.abs(np.linalg.norm(values, axis=1) - 1.0).max() > UNIT_TOLERANCE:
                 raise InputError(f"{path}: the frames of the {side} hand of the rig are damaged.")
         if not set(names) <= set(HAND_JOINTS):
-            raise InputError(f"{path}: the rig names {side} hand joints that no hand has.")
+            raise InputError(f"{path}: the rig has {side} hand joints that do not exist.")
         found[side] = StoredFrames(names, frames[0], frames[1])
     return found
 

@@ -124,4 +124,4 @@ def _layer_samples(attribute: Usd.Attribute) -> tuple[Sdf.Layer, Sdf.Path, list[
         keys = spec.layer.ListTimeSamplesForPath(spec.path)
         if keys:
             return spec.layer, spec.path, keys, np.array(keys) * offset.scale + offset.offset
-    raise AssertionError(f"{attribute.GetPath()} resolves to time samples, but has none")
+    raise AssertionError(f"{attribute.GetPath()} is resolved from time samples, but has none")

@@ -47,7 +47,7 @@ def read_skins(character: Character) -> tuple[tuple[Skin, ...], tuple[str, ...]]
     poses, _ = authored_poses(character, count, scale)
     queries = list(_queries(character))
     if poses.bind is None:
-        why = "no mesh is shown, since the skeleton has no usable bind pose"
+        why = "meshes are not shown, since the skeleton has no usable bind pose"
         return (), (why,) if queries else ()
     skins: list[Skin] = []
     notes: list[str] = []
@@ -56,7 +56,7 @@ def read_skins(character: Character) -> tuple[tuple[Skin, ...], tuple[str, ...]]
         name = query.GetPrim().GetName()
         if skin is None:
             notes.append(
-                f"the mesh {name} is not shown: its faces or weights do not fit its points"
+                f"the mesh {name} is not shown: its faces or weights do not match its points"
             )
         else:
             skins.append(skin)

@@ -114,14 +114,14 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
         if there is no such file, or USD cannot read it.
     """
     if not is_text(path):
-        raise InputError(f"{readable(path)}: this name is no valid text (UTF-8); USD needs one.")
+        raise InputError(f"{readable(path)}: this name is not valid UTF-8, which USD needs.")
     if not path.exists():
         raise InputError(f"{path}: no such file.")
     if path.is_dir():
         raise InputError(f"{path} is a folder, not a USD file.")
     if path.suffix.lower() not in USD_SUFFIXES:
         raise InputError(
-            f"{path}: '{path.suffix}' is no USD file; expected one of {', '.join(USD_SUFFIXES)}."
+            f"{path}: '{path.suffix}' is not a USD file; expected one of {', '.join(USD_SUFFIXES)}."
         )
     stage = None
     with usd_diagnostics() as messages:
@@ -131,7 +131,8 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
             messages += [_sentence(e) for e in error.args]
     if stage is None:
         detail = f" ({_first_line(messages[0])})" if messages else ""
-        raise InputError(f"{path}: USD cannot read this file; it may be damaged or no USD{detail}.")
+        message = "USD cannot read this file; it may be damaged or not USD"
+        raise InputError(f"{path}: {message}{detail}.")
     problems = [
         Problem("composition", f"not everything could be composed: {_first_line(str(error))}")
         for error in stage.GetCompositionErrors()
@@ -179,7 +180,7 @@ def find_character(path: Path, skel: str | None = None) -> Character:
     skeletons = find_skeletons(stage)
     if not skeletons:
         lost = f" Note: {problems[0]}." if problems else ""
-        raise InputError(f"{path}: no UsdSkel skeleton on this stage.{lost}")
+        raise InputError(f"{path}: there is no UsdSkel skeleton on this stage.{lost}")
     prim = choose_skeleton(path, skeletons, skel)
     return Character(stage, path, prim, bound_animation(prim), problems)
 
@@ -229,7 +230,7 @@ def _sentence(diagnostic: Any) -> str:
     try:
         return str(diagnostic.commentary).strip()
     except UnicodeDecodeError:  # it quotes bytes of a damaged file
-        return "it holds bytes that are no text"
+        return "it has bytes that are not text"
 
 
 def _first_line(text: str) -> str:

@@ -46,7 +46,7 @@ def world_above(skeleton: Usd.Prim, times: Array | None = None) -> World:
     scales = mean_scale(matrices[:, :3, :3])
     if not scales.all():
         raise InputError(
-            f"{stage.GetRootLayer().realPath}: {skeleton.GetPath()} stands under a zero scale."
+            f"{stage.GetRootLayer().realPath}: {skeleton.GetPath()} is below a zero scale."
         )
     axes = to_y_up(str(UsdGeom.GetStageUpAxis(stage)))
     cm = 100.0 * UsdGeom.GetStageMetersPerUnit(stage)
@@ -78,8 +78,8 @@ def _matrices(prim: Usd.Prim, times: Array | None) -> Array:
         matrices[i] = np.array(cache.GetLocalToWorldTransform(prim)).T
     if not np.isfinite(matrices).all():
         raise InputError(
-            f"{prim.GetStage().GetRootLayer().realPath}: not-a-number in the transforms above "
-            f"{prim.GetPath()}."
+            f"{prim.GetStage().GetRootLayer().realPath}: the transforms above {prim.GetPath()} "
+            "have values that are not numbers."
         )
     return matrices
 

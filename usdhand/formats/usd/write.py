@@ -100,7 +100,7 @@ def write_motion(
     }
     for motion in clips.values():
         if not np.isfinite(motion.rotations).all():
-            raise InputError(f"{character.path}: the result has rotations that are no numbers.")
+            raise InputError(f"{character.path}: the result has rotations that are not numbers.")
     skeleton = next(iter(clips.values())).skeleton
     changed = sorted({*changed, *range(len(joint_tokens(character)), len(skeleton))})
     layer = layer_over(character.stage)
@@ -176,7 +176,7 @@ def check_name(output: Path) -> None:
         if its bytes are no UTF-8.
     """
     if not is_text(output):
-        raise OutputError(f"{readable(output)}: this name is no valid text (UTF-8); USD needs one.")
+        raise OutputError(f"{readable(output)}: this name is not valid UTF-8, which USD needs.")
 
 
 def _make_relative(layer: Sdf.Layer, output: Path) -> tuple[Problem, ...]:

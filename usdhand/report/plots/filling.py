@@ -77,7 +77,7 @@ def speed(part: FilledPart, body: Clip, hands: Hands) -> Figure:
     axes[-1].set_xlabel("seconds")
     lines = [axes[0].lines[1], axes[0].collections[0], axes[0].lines[0]]
     labels = [
-        "speed, as seen from the hips",
+        "speed relative to the hips",
         "border of segments",
         f"threshold, {cutting.speed:g} cm/s",
     ]

@@ -60,7 +60,7 @@ def followers(reductions: Sequence[Reduction]) -> Figure | None:
     shown = style.spread(linear, MOST_FOLLOWERS)
     which = "" if len(shown) == len(linear) else f", {len(shown)} from the best to the worst"
     figure, axes = style.small_multiples(
-        f"{len(linear)} of {len(rig.names)} channels follow by a line{which}",
+        f"{len(linear)} of {len(rig.names)} channels follow others linearly{which}",
         len(shown),
         (2.6, 2.3),
         4,
@@ -99,7 +99,7 @@ def histograms(reductions: Sequence[Reduction]) -> Figure:
     both = moving[pairs[0]] & moving[pairs[1]]
     correlation = statistics.correlation[pairs][both]
     figure, (widths, same, opposite) = style.new_figure(
-        "How far channels move, and how alike pairs of them do", (9.5, 2.9), 1, 3
+        "Ranges of the channels, and distances of their pairs", (9.5, 2.9), 1, 3
     )
     widest = float(statistics.range.max(initial=0.0))
     step = next((s for s in BIN_WIDTHS if widest <= 25 * s), BIN_WIDTHS[-1])
@@ -121,7 +121,7 @@ def histograms(reductions: Sequence[Reduction]) -> Figure:
         panel.hist(distance, np.linspace(0, 2, 21).tolist(), color=BLUE, edgecolor="white")
         close = int((distance < rig.rmsd_threshold).sum())
         _threshold(panel, rig.rmsd_threshold, f"below {rig.rmsd_threshold:.3g}: {close} pairs")
-        panel.set_title(f"distance of {len(distance)} pairs, {words} sense")
+        panel.set_title(f"distance of {len(distance)} pairs, {words} direction")
         panel.set_xlabel("RMS deviation of standardised curves")
         panel.set_ylabel("pairs")
         panel.set_xlim(0, 2)
@@ -199,7 +199,7 @@ def errors(reductions: Sequence[Reduction]) -> Figure:
         there = np.isfinite(by_count)
         panel.plot(counts[there], by_count[there], color=colour, label=label, linewidth=width)
     bound = [pca_rms(stacked, int(n)) for n in counts]
-    panel.plot(counts, bound, "--", color=GREY, label="PCA: the least of any linear model")
+    panel.plot(counts, bound, "--", color=GREY, label="PCA: the smallest error of any linear model")
     own = float(np.sqrt(np.mean(_rms(reductions) ** 2)))
     label = f"this rig: {len(rig.free)} free, {own:.2f} deg"
     panel.plot([len(rig.free)], [own], "o", color=ORANGE, label=label)

@@ -71,7 +71,7 @@ def path(
         f"{side.capitalize()} hand: which moments belong together", (6.4, 5.6)
     )
     image = panel.pcolormesh(rows, columns, costs.T, cmap="gray", rasterized=True)
-    figure.colorbar(image, ax=panel, label="cost of a match (dark: alike)", shrink=0.8, pad=0.01)
+    figure.colorbar(image, ax=panel, label="cost of a match (dark: similar)", shrink=0.8, pad=0.01)
     band = first_band(len(ours), len(theirs), settings, alignment.pins)
     at = style.sampled(len(ours), BAND_POINTS)
     seconds, low, high = at / ours.fps, band.low[at] / theirs.fps, band.high[at] / theirs.fps

@@ -37,10 +37,10 @@ def read_report(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: no JSON ({error}).") from error
     verb = report_verb(report)
     if verb not in SHOWN_VERBS:
-        shown = f"the timeline shows those of {' and '.join(SHOWN_VERBS)}."
+        shown = f"the timeline shows reports of {' and '.join(SHOWN_VERBS)}."
         if verb:
             raise UsageError(f"{path}: a report of '{verb}'; {shown}")
-        raise InputError(f"{path}: no report of usdhand; {shown}")
+        raise InputError(f"{path}: not a report of usdhand; {shown}")
     inputs = report.setdefault("inputs", [])
     if not isinstance(inputs, list) or not all(
         isinstance(x, dict) and {"path", "sha256"} <= x.keys() for x in inputs
@@ -87,7 +87,7 @@ def lane_of(
     if not fitting:
         names = dict.fromkeys(p.name for p in (*made, *(Path(str(own["path"])) for own in of)))
         raise UsageError(
-            f"{path}: the report tells of none of the files that are shown, but of "
+            f"{path}: the report belongs to none of the files that are shown, but to "
             f"{' and '.join(names) or 'none at all'}."
         )
     alternatives = [x for x in fitting if x.clip.origin.path == fitting[0].clip.origin.path]

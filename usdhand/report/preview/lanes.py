@@ -59,8 +59,8 @@ def lane_data(lane: Lane, pack: Pack, max_frames: int) -> dict[str, Any]:
     notes = list(lane.notes)
     if every > 1:
         notes.append(
-            f"long clip, the page has every {_ordinal(every)} of {len(clip)} frames "
-            f"({clip.fps / every:.3g} a second) and blends between them"
+            f"long clip: the page has every {_ordinal(every)} of {len(clip)} frames "
+            f"({clip.fps / every:.3g} a second) and interpolates between them"
         )
     drawn = _drawn(clip.skeleton, lane.hands)
     positions = forward_kinematics(clip).positions[:: max(every, len(clip) // 600)]

@@ -72,7 +72,7 @@ def figure(path: Path) -> dict[str, str]:
     """
     kind = FIGURE_TYPES.get(path.suffix.lower())
     if kind is None:
-        raise InputError(f"{path}: no figure; use one of {', '.join(FIGURE_TYPES)}.")
+        raise InputError(f"{path}: not a figure; use one of {', '.join(FIGURE_TYPES)}.")
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -89,9 +89,9 @@ def _wrong_svg(content: bytes) -> str:
     try:
         root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        return f"no SVG, since it is no XML ({error})"
+        return f"not an SVG, since it is not XML ({error})"
     if root.tag != SVG_ROOT:
-        return f"no SVG, since its root is '{root.tag}', not 'svg' of {SVG_ROOT[1:-4]}"
+        return f"not an SVG, since its root is '{root.tag}', not 'svg' of {SVG_ROOT[1:-4]}"
     return ""
 
 
@@ -99,7 +99,7 @@ def _wrong_png(content: bytes) -> str:
     """What is wrong with the header of a PNG, "" for nothing."""
     header = content[12:29]  # "IHDR" and its fields
     if not content.startswith(PNG_SIGNATURE) or header[:4] != b"IHDR" or len(content) < 33:
-        return "no PNG, since it does not begin as one"
+        return "not a PNG, since it does not begin like one"
     width, height = struct.unpack(">II", header[4:12])
     if zlib.crc32(header) != int.from_bytes(content[29:33], "big") or not width or not height:
         return "a PNG with a damaged header"
