@@ -23,8 +23,8 @@ class Problem:
     code : a stable name for scripts, such as "guessed-units"
     message : what is odd, and what to do where something can be done
     where : prim, joint or frame
-    severity : a "note" is right as it is and only good to know; a "warning" may need care; an
-        "error" is something that could not be done, or is shown wrongly
+    severity : a "note" is good to know, nothing is wrong; a "warning" may need care; an
+        "error" is something that could not be done, or will be shown wrongly
     file : the file that it is about
     """
 

@@ -73,14 +73,14 @@ class LibraryHand:
 )
 @dataclass(frozen=True, eq=False)
 class LibraryClip:
-    """A clip as the library knows it.
+    """A clip in a library.
 
     Attributes
     ----------
     name : unique in the library
-    path : the clip's file, as the library refers to it
+    path : the clip's file, as it is in the library
     skel : path of its skeleton
-    label, actor : what is said of it, "" if nothing
+    label, actor : "" if there is none
     height : cm, of the character
     fps : of the fingers
     duration : seconds
@@ -110,7 +110,7 @@ class LibraryClip:
 )
 @dataclass(frozen=True, eq=False)
 class MotionLibrary:
-    """Clips in order of their names, and how they were cut.
+    """Clips in the order of their names, and how they were cut into segments.
 
     ``left_out`` could not be used when the library was built; ``damaged`` are prims that could not
     be read from it.

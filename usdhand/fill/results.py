@@ -99,7 +99,7 @@ class Filled:
     kept : hands whose own finger motion was kept, since it moves
     without : hands that the library has no motion for
     changed : joints of the skeleton that were filled
-    missing : hand joints that no clip that was used has; they were kept
+    missing : hand joints that no used clip has; they keep their values
     left_out : names of library clips that were not used, since they are the body's own
     set_aside : names of library clips that were not used, since they lack joints that were filled
     still : hands whose arm does not move at all; their fingers hold one pose

@@ -33,13 +33,13 @@ Feature = Literal[
 @displayed()
 @dataclass(frozen=True)
 class Metric:
-    """How alike two arm motions are: the weighted sum of squared distances of features.
+    """How similar two arm motions are: the weighted sum of squared distances of features.
 
     Attributes
     ----------
     name : for reports
     weights : feature -> weight above 0; positions are in cm, rotations in degrees. One of
-        hips_position, chest_position, shoulder_position, elbow_position (of the wrist, seen from
+        hips_position, chest_position, shoulder_position, elbow_position (of the wrist, relative to
         there), shoulder_from_hips, elbow_from_hips, upper_arm, forearm, hips_palm, chest_palm,
         euler_palm (rotations) and wrist (how it bends)
     """
@@ -80,7 +80,7 @@ class Segmentation:
 
     Attributes
     ----------
-    speed : cm / s at reference height; a border lies where the wrist's speed crosses it
+    speed : cm / s at reference height; a border is where the speed of the wrist crosses it
     shortest, longest : seconds
     smoothing : seconds, standard deviation of the Gaussian that positions are smoothed with
     """
@@ -109,13 +109,13 @@ class FillSettings:
     Attributes
     ----------
     metric : of arm motion: the name of one of `METRICS`, or one of your own
-    k : candidates a segment
+    k : candidates per segment
     factor : largest ratio of lengths of a segment and its candidate
     pool : nearest segments whose fingers tell which of them is typical; 0: none, the cost alone
     segmentation : how the motion is cut; None: as the library is
     sharpness : how fast the weight of one of the pool falls with its cost
     segment_weight, transition_weight : of both costs on the path
-    scaled : bring both costs to the same average first, as the paper wants them
+    scaled : bring both costs to the same average first, as in the paper
     repeat_weight : of playing one piece of the library twice in a row, in usual transition costs
     angle_weight, velocity_weight : of the transition cost
     alternatives : how many results
@@ -125,7 +125,7 @@ class FillSettings:
     metric: str | Metric = option(
         "How arm motions are compared: arm, chordal or euler (the paper's).", default=DEFAULT_METRIC
     )
-    k: int = option("Candidates a segment.", default=5, at_least=1)
+    k: int = option("Candidates per segment.", default=5, at_least=1)
     factor: float = 1.5
     pool: int = 20
     sharpness: float = 0.5

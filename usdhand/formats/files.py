@@ -25,7 +25,7 @@ def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFA
     ----------
     path : a file with one of the suffixes `usdhand.formats.suffixes.READABLE`
     skel : path or name of the skeleton where there are several
-    reading : more to say about files whose format leaves it open
+    reading : what the file itself does not state, and what to choose of it
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What to read of a file, and what it means where it does not say so itself."""
+"""What to read of a file, and what holds where the file does not state it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from usdhand.units import read_unit
 @displayed()
 @dataclass(frozen=True)
 class Reading:
-    """What to read of a file, and what it means where it does not say so itself.
+    """What to read of a file, and what holds where the file does not state it.
 
     Attributes
     ----------

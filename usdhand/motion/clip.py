@@ -21,7 +21,7 @@ from usdhand.problems import Problem
 @displayed()
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Where a clip was read from, and what its file measures in: enough to write it back.
+    """Where a clip was read from, and the units of its file: enough to write it back.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Origin:
 class Clip:
     """Motion of one character: centimetres, seconds, Y up.
 
-    Whatever stands above the skeleton in its file (units, axes, placement, animated or not) is
+    Whatever is above the skeleton in its file (units, axes, placement, animated or not) is
     part of the root joints' transforms, so that forward kinematics gives world space.
 
     Attributes

@@ -55,9 +55,9 @@ class Skeleton:
     bind : (joints, 4, 4) joint-to-world matrices of the bind pose, for column vectors, cm
     rest : (joints, 4, 4) joint-to-parent matrices of the rest pose, cm
     aliases : names that a file gives to its joints besides their own, such as the humanoid bones of
-        a VRM avatar: one a joint ("" for none), or empty
-    originals : the joints' names in the file where they are no legal USD names: one a joint, or
-        empty where all are as they were
+        a VRM avatar: one per joint ("" for none), or empty
+    originals : the joints' names in the file where they are not legal in USD: one per joint, or
+        empty if all are unchanged
     """
 
     joints: tuple[str, ...]

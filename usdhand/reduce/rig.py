@@ -89,7 +89,7 @@ class ReducedRig:
         UsageError
             if a free channel has no curve.
         InputError
-            if a controller is missing or controllers form a circle.
+            if a controller is missing or controllers form a cycle.
         """
         curves = dict(zip(self.free, free.select(self.free).values.T, strict=True))
         frames = len(free.values)

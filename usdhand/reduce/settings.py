@@ -46,16 +46,16 @@ class Target:
 @displayed()
 @dataclass(frozen=True)
 class ReduceSettings:
-    """How a rig is fitted: by one way to say how small it shall be, the paper's step 4 by default.
+    """How a rig is fitted: one measure of its size; step 4 of the paper by default.
 
     Attributes
     ----------
     preset : 1 to 4, the paper's steps
-    range_deg, rmsd : thresholds of one's own, degrees and of standardised curves
-    free_channels : how many channels shall stay free
+    range_deg, rmsd : own thresholds, in degrees and for standardised curves
+    free_channels : how many channels stay free
     max_error : largest RMS error of any channel, degrees
-    fit : "paper" keeps standard deviations, "least-squares" has the least error
-    controllers : how many channels one may follow, with least squares
+    fit : "paper" keeps standard deviations, "least-squares" has the smallest error
+    controllers : how many channels a channel may follow, with least squares
     """
 
     preset: int | None = option(

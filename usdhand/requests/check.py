@@ -16,8 +16,9 @@ from usdhand.requests.base import Request
 class CheckRequest(Request):
     """Check files with UsdValidation and additional rules.
 
-    Finds what validators miss and tools stumble on: joint names that are no legal prim names,
-    missing bind, rest or scales, time codes that would be rescaled. Exit 1 if there is an error.
+    Finds what USD's validators do not check and other tools fail on: illegal joint names,
+    missing bind, rest or scales, time codes that would be rescaled. Exit code 1 if there is an
+    error.
 
     \b
     Example:

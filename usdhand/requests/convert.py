@@ -43,7 +43,7 @@ class Edits:
     start : time code of the first frame in the output
     trim : first and last time code to keep, in the input's time codes
     scale : factor on the character's size
-    root_motion : "drop" keeps the hips over the spot where they start
+    root_motion : "drop" keeps the hips above the point where they start
     up : "Y" or "Z", the up axis of the output (USD and BVH)
     """
 
@@ -66,7 +66,7 @@ class Edits:
 
     @property
     def of_frames(self) -> bool:
-        """Whether the motion itself is another one afterwards."""
+        """Whether the motion itself changes."""
         return self.fps is not None or self.trim != (None, None) or self.root_motion == "drop"
 
 
@@ -75,9 +75,9 @@ class Edits:
 class ConvertRequest(Request):
     """Convert motion between USD, BVH, glTF (also VRM) and FBX (read only).
 
-    A converted USD file stands alone, with a complete character; of a USD input all else is kept,
-    meshes, materials and cameras too. With --onto the fingers go to another character, whatever
-    its names, axes and proportions. What a file does not say is guessed, and said.
+    A converted USD file is complete in itself. If the input is USD, everything else is kept, such
+    as meshes, materials and cameras. With --onto the fingers go to another character, whatever its
+    names, axes and proportions. What a file does not state is guessed, with a note.
 
     \b
     Examples:

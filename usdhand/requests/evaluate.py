@@ -16,12 +16,12 @@ from usdhand.requests.fill import Preset
 @displayed()
 @dataclass(frozen=True, kw_only=True)
 class EvaluateRequest(Request):
-    """Measure how well a library tells fingers from arms, leaving out one clip at a time.
+    """Measure how well a library predicts fingers from arms, leaving out one clip at a time.
 
-    The share of same-label segments among the nearest, for single features and combinations, with
-    the confusion matrix (Joerg, Hodgins and Safonova 2012, section 4); and how near filled fingers
-    come to the true ones, beside the nearest segment, a random take, the mean pose, the rest pose
-    and the best candidate in hindsight.
+    Reports how many of the nearest segments have the same label, for single features and
+    combinations, with the confusion matrix (Joerg, Hodgins and Safonova 2012, section 4); and the
+    errors of filled fingers, compared with the nearest segment, a random take, the mean pose, the
+    rest pose and the best of the candidates.
 
     \b
     Example:

@@ -23,7 +23,7 @@ class FillRequest(Request):
 
     Cuts the body's arm motion into segments, finds the most similar segments of the library,
     chooses the smoothest path through them and joins the pieces (Joerg, Hodgins and Safonova
-    2012). The body stays as it is; the library's clip of the very same motion is left out.
+    2012). The body stays as it is; library clips of the same performance are left out.
 
     \b
     Example:

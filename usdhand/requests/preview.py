@@ -20,7 +20,7 @@ class PreviewSettings:
 
     Attributes
     ----------
-    max_frames : longer clips keep every second, third, ... frame, so that they have no more
+    max_frames : longer clips keep every second, third, ... frame, down to this number
     max_points : characters with larger meshes are shown as bones; 0 for no meshes at all
     """
 
@@ -43,7 +43,7 @@ class PreviewSettings:
 @displayed()
 @dataclass(frozen=True, kw_only=True)
 class PreviewRequest(Request):
-    """Make a page to look at clips with: one HTML file that opens offline in any browser.
+    """Make a page that shows clips: one HTML file that opens offline in any browser.
 
     Files play side by side or over each other, in sync from their first frames, with close-up
     cameras on the hands and curves of their channels. Alternatives that fill wrote into a file

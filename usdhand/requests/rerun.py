@@ -17,7 +17,7 @@ from usdhand.requests.base import Request
 class RerunRequest(Request):
     """Make a result again from its report: the same verb, inputs and settings.
 
-    Paths in the report are seen from the folder that you are in, as they were when it was made.
+    Relative paths in the report start at the current folder, as they did when it was made.
     An input that has changed since is refused, unless --accept-changes is given.
 
     \b

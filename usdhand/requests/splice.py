@@ -18,7 +18,7 @@ from usdhand.splice.settings import SpliceSettings
 class SpliceRequest(Request):
     """Put the fingers of a hand clip on a body clip, both of the same performance.
 
-    Finds out which moments belong together from how both arms move, whatever their size, timing
+    Finds which moments belong together from how both arms move, whatever their size, timing
     and direction in the room, retimes the hand clip and puts its fingers on the body (Majkowska,
     Zordan and Faloutsos 2006). The body's own motion and timing stay as they are.
 
@@ -28,7 +28,7 @@ class SpliceRequest(Request):
         --pin 1:1 --pin 181:403 -o talk.usda --report talk.json
 
     The hand clip of the example shows the first six seconds of the body: pins say where it begins
-    and ends. Of clips that begin and end together, no pin is needed.
+    and ends. Clips that begin and end together need no pin.
     """
 
     verb: ClassVar[str] = "splice"

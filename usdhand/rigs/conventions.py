@@ -130,8 +130,8 @@ def load_conventions(*extra: str | Path | Mapping[str, Mapping[str, Any]]) -> Co
 
     Parameters
     ----------
-    extra : map files, or tables as such a file has them; later ones win over earlier ones, all win
-        over the package
+    extra : map files, or tables as such a file has them; later ones override earlier ones, and all
+        override the package
 
     Raises
     ------

@@ -77,7 +77,7 @@ def add_finger_joints(
 
     The hand is scaled by the ratio of the forearms (of the heights where there is none), put to
     the body's wrist along the hand, and turned so that the thumb is where it is in bind poses:
-    toward where the character looks. A hand that the donor lacks is its other one mirrored.
+    toward where the character faces. If the donor lacks a hand, its other hand is mirrored.
 
     Raises
     ------

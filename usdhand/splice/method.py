@@ -94,7 +94,7 @@ class Alignment:
 )
 @dataclass(frozen=True, eq=False)
 class Spliced:
-    """The body with the hand clip's fingers, how each hand was aligned, what was odd, and how."""
+    """The body with the hand clip's fingers, the alignment of each hand, problems, and settings."""
 
     clip: Clip
     hands: Mapping[Side, Alignment]
@@ -124,10 +124,10 @@ def splice(
     HandNotFoundError
         if the clips have no hand, or no finger joint of one, in common.
     InputError
-        if no hand moves, so that there is nothing to align, and pins do not tell either; if the
+        if no hand moves, so that there is nothing to align, and pins do not give the timing; if the
         body's fingers move and none of the hand clip's do.
     UsageError
-        if pins cannot hold, or the clips' lengths are too different.
+        if pins contradict each other, or the clips' lengths are too different.
     CancelledError
         if ``progress`` returned False.
     """

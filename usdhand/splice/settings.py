@@ -24,7 +24,7 @@ class Pin:
     body, hand : seconds from the first frame of their clips
     tolerance : seconds of the hand clip that the warp may be off; 0: exact
     side : the hand it is for, None for both
-    name : as the user gave it, for messages
+    name : text that the user gave, for messages
     """
 
     body: float

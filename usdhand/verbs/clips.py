@@ -63,7 +63,7 @@ def write_clip(
     """Write a clip's hands as a layer over the file it was read from; the body stays as it is.
 
     A clip without a source, which was made in memory, is written as a file with a complete
-    character. Returns what one file, if it was to be one, could not keep.
+    character. Returns what flattening could not keep, and other problems of the file.
 
     Raises
     ------

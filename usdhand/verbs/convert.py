@@ -192,10 +192,10 @@ def write_new(
 
 
 def retarget_hands(hands: Clip, target: Clip, conventions: Conventions | None = None) -> Clip:
-    """Put the finger motion of one clip on another character, in the time of the hands.
+    """Put the finger motion of one clip on another character, with the times of the hands.
 
     Channels that both hands have are taken by their anatomical angles; the others, and the body,
-    stay the target's, whose motion is held at its ends where the hands go on longer.
+    stay those of the target, whose motion is held at its end if the hands last longer.
 
     Raises
     ------
@@ -222,9 +222,9 @@ def retarget_hands(hands: Clip, target: Clip, conventions: Conventions | None = 
 def _check_up(output: Path, up: str) -> None:
     """Refuse an up axis that the output cannot have, before anything is written."""
     if up not in get_args(UpAxis):
-        raise UsageError(f"up: '{up}' is none of {' and '.join(get_args(UpAxis))}.")
+        raise UsageError(f"up: '{up}' must be {' or '.join(get_args(UpAxis))}.")
     if up == "Z" and output.suffix.lower() in (".glb", ".gltf"):
-        raise UsageError(f"{output}: glTF is always Y up, so --up Z cannot be had.")
+        raise UsageError(f"{output}: glTF is always Y up, so --up Z is not possible.")
 
 
 def _placed(clip: Clip, edits: Edits, retimed: bool) -> tuple[Clip, StageEdit]:

@@ -44,7 +44,7 @@ def expand_onto(
 ) -> Clip:
     """Motion of a rig file's hands on another character, in the rig's time.
 
-    The body keeps the target's own motion, its ends held, or its bind pose where it has none.
+    The body keeps the target's own motion, held at its ends, or its bind pose if it has none.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def fill_fingers(
 ) -> Filled:
     """Give a body clip the fingers of similar motions.
 
-    The library's clip of the very same motion, by its content or as it moves, is left out.
+    Library clips of the same performance, by content or by motion, are left out.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def write_filled(
 
     A body that was made in memory becomes a complete character.
 
-    Returns what one file, if it was to be one, could not keep.
+    Returns what flattening could not keep, and other problems of the file.
 
     The variant set ``fingers`` is on the new SkelAnimation; ``choice_1``, the best, is selected.
     Joints that the body has beyond its file (`add_finger_joints`) are added to its Skeleton.

@@ -35,10 +35,10 @@ from usdhand.verbs.clips import find_hands
 )
 @dataclass(frozen=True)
 class BuildResult:
-    """A built library and how many of its clips were read anew or taken over as they were.
+    """A built library, and how many of its clips were read now or kept unchanged.
 
-    ``unmatched`` are files that labels were given for and that are not among the clips;
-    ``removed`` are clips of the library before that are not among those given.
+    ``unmatched`` are files that have labels but are not among the clips;
+    ``removed`` are clips of the old library that were not given this time.
     """
 
     library: MotionLibrary
@@ -80,14 +80,14 @@ def build_library(
     Parameters
     ----------
     output : where the library will be written, for relative paths
-    labels : file -> (label, actor), the file with as many of its folders as tell it apart, with
+    labels : file -> (label, actor), the file name with as many folders as make it unique, with
         or without its suffix; else labels come from file names
     previous : clips whose content has not changed are taken over from it; labels that someone
         edited, and actors, of the others too, as long as file or content is the same
-    rebuild : take over nothing but labels and actors
+    rebuild : keep only labels and actors
     jobs : processes
-    keep : seconds after which what was read is kept beside the output, so that a build that was
-        interrupted goes on where it was
+    keep : seconds after which what was read is saved beside the output, so that a build that was
+        interrupted continues there
     progress : gets how many clips are read and how many there are; False stops, and what was read
         is kept as after an interruption
 

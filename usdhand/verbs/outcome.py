@@ -84,7 +84,7 @@ class Journal:
 )
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of a request.
+    """What a request led to.
 
     Attributes
     ----------

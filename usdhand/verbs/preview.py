@@ -80,7 +80,7 @@ def preview_clips(
     InputError
         if a file cannot be used.
     UsageError
-        if there is nothing to show, or a report tells of none of the files.
+        if there is nothing to show, or a report belongs to none of the files.
     """
     if not clips:
         raise UsageError("There is nothing to show: give a file.")

@@ -25,14 +25,14 @@ def run(
 
     Parameters
     ----------
-    listener : hears of everything odd as it comes
+    listener : gets each problem at once
     watch : gets what is done, how many steps are done, and how many there are; what returns False
         stops the run
 
     Raises
     ------
     UsdHandError
-        if it cannot be done; its class says what kind of reason there is.
+        if it cannot be done; the class tells the kind of reason.
     """
     return run_verb(request, Journal(listener, watch))
 

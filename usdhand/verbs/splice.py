@@ -60,10 +60,10 @@ def splice_hands(
     HandNotFoundError
         if the clips have no hand, or no finger joint of one, in common.
     InputError
-        if no hand moves, so that there is nothing to align, and pins do not tell either; if the
+        if no hand moves, so that there is nothing to align, and pins do not give the timing; if the
         body's fingers move and none of the hand clip's do.
     UsageError
-        if pins cannot hold, or the clips' lengths are too different.
+        if pins contradict each other, or the clips' lengths are too different.
     CancelledError
         if ``progress`` returned False.
     """
@@ -88,7 +88,7 @@ def parse_pin(text: str, body: Clip, hands: Clip) -> Pin:
     Raises
     ------
     UsageError
-        if it is no such text, or a time code is outside of its clip.
+        if it is not such a text, or a time code is outside its clip.
     """
     first, _, rest = text.partition(":")
     side = next((s for s in SIDES if s == first.strip().lower()), None)

@@ -108,7 +108,7 @@ def read_library(path: str | Path) -> MotionLibrary:
     Raises
     ------
     InputError
-        if the file is no library, of another version, or nothing in it can be used.
+        if the file is not a library, is of another version, or nothing in it can be used.
     """
     path = Path(path)
     stage = _open(path)

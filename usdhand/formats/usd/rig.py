@@ -80,7 +80,8 @@ def write_rig(
 ) -> tuple[Problem, ...]:
     """Write a rig over its clip, with the reduced motion baked beside it.
 
-    Returns what one file, if it was to be one, could not keep. Raises the errors of `write_motion`.
+    Returns what flattening could not keep, and other problems of the file. Raises the errors of
+    `write_motion`.
     """
     frames = reduction.hands.frames.values()
     reduction = replace(reduction, clip=as_on_stage(reduction.clip, character))
