@@ -11,6 +11,7 @@ from usdhand.display import displayed
 Severity = Literal["note", "warning", "error"]
 
 LISTED = 3  # names that a message shows before it says "and N more"
+CHOICES = 8  # the same, where the user is to choose one
 
 
 @displayed()

@@ -1,4 +1,4 @@
-"""What cannot be meant is refused in a sentence, by settings, methods and verbs alike."""
+"""What is not possible is refused in a sentence, by settings, methods and verbs alike."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ NUMBERS: list[tuple[Callable[[], object], str]] = [
     (lambda: usdhand.ReduceSettings(preset=1, rmsd=0.1).target, "not both"),
     (lambda: usdhand.ReduceSettings(rmsd=3.0).target, "an rmsd from 0 to 2"),
     (lambda: metric_of("nose"), "no metric 'nose'; there are euler, chordal, arm"),
-    (lambda: scaled(sample("gestures/ok_01"), 0.0), "A scale of 0 cannot be meant"),
-    (lambda: starting_at(sample("gestures/ok_01"), np.nan), "A start of nan cannot be meant"),
+    (lambda: scaled(sample("gestures/ok_01"), 0.0), "A scale of 0 is not possible"),
+    (lambda: starting_at(sample("gestures/ok_01"), np.nan), "A start of nan is not possible"),
 ]
 
 
 @pytest.mark.parametrize(("make", "words"), [*CHOICES, *NUMBERS])
-def test_settings_that_cannot_be_meant(make: Callable[[], object], words: str) -> None:
+def test_settings_that_are_not_possible(make: Callable[[], object], words: str) -> None:
     with pytest.raises(usdhand.UsageError, match=words):
         make()
 
@@ -85,7 +85,7 @@ def test_a_hand_without_a_direction_gets_no_fingers() -> None:
     bare = usdhand.Clip.from_arrays(**arrays_of(clip) | {"bind": bind})
     donor = sample("gestures/ok_01")
     names = usdhand.load_conventions({"left": {"wrist": "LeftHand", "elbow": "LeftForeArm"}})
-    with pytest.raises(usdhand.HandNotFoundError, match="so the hand has no direction"):
+    with pytest.raises(usdhand.HandNotFoundError, match="the direction of the hand is unknown"):
         usdhand.add_finger_joints(
             bare, donor.skeleton, usdhand.find_hands(donor), names, sides=("left",)
         )

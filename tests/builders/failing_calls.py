@@ -149,7 +149,9 @@ def cases(folder: Path) -> Iterator[Case]:
     )
     yield Case("expand", no_input, "no hand rig", lambda: usdhand.expand(OK))
     named = usdhand.load_conventions({"left": {"wrist": "Nobody"}})
-    yield Case("expand", no_hand, "'Nobody' is no joint here", lambda: usdhand.expand(rig, named))
+    yield Case(
+        "expand", no_hand, "'Nobody' is not in the skeleton", lambda: usdhand.expand(rig, named)
+    )
     yield Case("expand_onto", no_input, "no such file", lambda: usdhand.expand_onto(rig, nothing))
     yield Case(
         "expand_onto",
@@ -207,7 +209,7 @@ def cases(folder: Path) -> Iterator[Case]:
     yield Case(
         "load_conventions",
         usage,
-        r"\[left\] wirst: no such joint",
+        r"\[left\] wirst: unknown joint",
         lambda: usdhand.load_conventions({"left": {"wirst": "x"}}),
     )
     yield Case(
@@ -216,11 +218,11 @@ def cases(folder: Path) -> Iterator[Case]:
         "Stopped after 0 of",
         lambda: usdhand.measure_library(library, folder, progress=lambda *_: False),
     )
-    yield Case("parse_pin", usage, "is no pin", lambda: usdhand.parse_pin("1", body, fingers))
+    yield Case("parse_pin", usage, "is not a pin", lambda: usdhand.parse_pin("1", body, fingers))
     yield Case(
         "parse_pin",
         usage,
-        "outside of the hand clip",
+        "outside the hand clip",
         lambda: usdhand.parse_pin("1:99999", body, fingers),
     )
     yield Case("preview_clips", no_input, "no such file", lambda: usdhand.preview_clips([nothing]))
@@ -241,7 +243,10 @@ def cases(folder: Path) -> Iterator[Case]:
     )
     yield Case("reduce_hands", no_hand, "no hand found", lambda: usdhand.reduce_hands([bare]))
     yield Case(
-        "reduce_hands", no_input, "has one frame", lambda: usdhand.reduce_hands([first_frame(clip)])
+        "reduce_hands",
+        no_input,
+        "has only one frame",
+        lambda: usdhand.reduce_hands([first_frame(clip)]),
     )
     yield Case(
         "reduce_hands",
@@ -252,7 +257,7 @@ def cases(folder: Path) -> Iterator[Case]:
     yield Case(
         "reduce_hands",
         usdhand.QualityError,
-        "cannot be met",
+        "is not possible",
         lambda: usdhand.reduce_hands([clip], usdhand.ReduceSettings(max_error=0.0)),
     )
     yield Case(
@@ -383,7 +388,7 @@ def writers(
         ),
     }
     for name, call in nan.items():
-        yield Case(name, usdhand.InputError, "no numbers", call)
+        yield Case(name, usdhand.InputError, "not numbers", call)
     lost = {
         "write_filled": lambda: usdhand.write_filled(filled, no_folder),
         "write_spliced": lambda: usdhand.write_spliced(spliced, no_folder),

@@ -83,7 +83,9 @@ def test_relative_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_names_that_are_no_text_are_refused(suffix: str, tmp_path: Path) -> None:
     odd = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff"))
     path = plain(tmp_path)
-    refused(path, odd.with_suffix(suffix), r"\\xff\.usd.: name is not valid UTF-8", flatten=True)
+    refused(
+        path, odd.with_suffix(suffix), r"\\xff\.usd.: this name is not valid UTF-8", flatten=True
+    )
     output = odd.with_suffix(suffix)
     result = run("convert", path, "-o", output, code=2)
     assert r"\xff.usd" in result.output

@@ -56,7 +56,8 @@ def _call(owner: type[Request]) -> None:
     if as_json:
         click.echo(outcome.to_json())
     elif not quiet:
-        say(outcome.to_text(context.params.get("verbose", False)))
+        if text := outcome.to_text(context.params.get("verbose", False)):
+            say(text)
         if outcome.drawn is not None:
             say(f"plots written to {outcome.drawn}")
     context.exit(outcome.exit_code)

@@ -13,6 +13,7 @@ from usdhand.motion.skeleton import Skeleton
 from usdhand.motion.transforms import unit
 
 Chain = tuple[int, ...]
+SAME_PLACE = 1e-3  # of the character's size: joints that lie no further apart are in one place
 
 
 def joint_points(skeleton: Skeleton) -> Array:
@@ -118,7 +119,7 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
         up = unit(points[chest] - points[spine[-1]])
     if legs:
         tops = np.mean([points[leg[0]] for leg in legs], axis=0)
-        joints["hips"] = min(spine[1:], key=lambda j: float(np.linalg.norm(points[j] - tops)))
+        joints["hips"] = _nearest(points, spine[:0:-1], tops)
         up = unit(tops - np.mean([points[leg[-1]] for leg in legs], axis=0))
         facing = _toe_direction(points, legs, up)
     arms = {a for w in wrists for a in (w, *skeleton.ancestors(w))}
@@ -135,6 +136,13 @@ def body_of(skeleton: Skeleton, points: Array, wrists: Sequence[int]) -> Body:
         if skeleton.children[neck]:
             joints["head"] = max(skeleton.children[neck], key=lambda c: (heights[c], -c))
     return Body(joints, up, facing)
+
+
+def _nearest(points: Array, line: Sequence[int], place: Array) -> int:
+    """The joint nearest to a place; of joints in one place the first of the line."""
+    apart = np.linalg.norm(points[list(line)] - place, axis=1)
+    same = SAME_PLACE * float(np.ptp(points, axis=0).max())
+    return line[int(np.flatnonzero(apart <= apart.min() + same)[0])]
 
 
 def _below(skeleton: Skeleton, points: Array, wrists: Sequence[int], joint: int, up: Array) -> bool:

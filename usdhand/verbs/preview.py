@@ -16,6 +16,7 @@ from usdhand.formats.output import check_output, written_beside
 from usdhand.formats.usd.shown import ShownMotion, read_shown
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
+from usdhand.problems import listed
 from usdhand.report.preview.events import (
     lane_of,
     read_report,
@@ -212,9 +213,7 @@ def _few_shown(lanes: Sequence[Lane]) -> tuple[list[Lane], list[str]]:
 
 
 def _title(names: Sequence[str]) -> str:
-    if len(names) <= MOST_SHOWN:
-        return ", ".join(names)
-    return f"{', '.join(names[:2])} and {len(names) - 2} more"
+    return listed(names, MOST_SHOWN if len(names) <= MOST_SHOWN else 2)
 
 
 def _names(sources: Sequence[Clip | Path]) -> dict[Clip | Path, str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from usdhand.errors import InputError, UsageError
-from usdhand.formats.gltf.document import Document, Element, listed
+from usdhand.formats.gltf.document import Document, Element, choices
 from usdhand.formats.gltf.nodes import Tree
 from usdhand.formats.gltf.vrm import Humanoid
 
@@ -196,12 +196,12 @@ def _chosen(path: Path, found: list[GltfCharacter], skel: str | None) -> GltfCha
         if len(found) == 1:
             return found[0]
         raise UsageError(
-            f"{path}: has {len(found)} skeletons: {listed(labels)}. Choose one with --skel NAME."
+            f"{path}: has {len(found)} skeletons: {choices(labels)}. Choose one with --skel NAME."
         )
     fitting = [i for i, label in enumerate(labels) if label == skel]
     fitting = fitting or [i for i, c in enumerate(found) if skel in c.names]
     if len(fitting) != 1:
-        raise UsageError(f"{path}: has no skeleton '{skel}', only {listed(labels)}.")
+        raise UsageError(f"{path}: has no skeleton '{skel}', only {choices(labels)}.")
     [i] = fitting
     chosen = found[i]
     return GltfCharacter(chosen.nodes, (labels[i], *chosen.names), chosen.skins, len(found) == 1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.gltf.accessors import read_rows
-from usdhand.formats.gltf.document import Document, Element, listed, unused
+from usdhand.formats.gltf.document import Document, Element, choices, unused
 from usdhand.formats.gltf.nodes import SHORTEST
 from usdhand.formats.suffixes import CHOOSE_ANIMATION
 from usdhand.motion import rotations as rot
@@ -78,7 +78,7 @@ def choose(path: Path, names: dict[int, str], animation: str | None) -> int:
     """
     if not names:
         raise InputError(f"{path}: holds no animation of any node.")
-    labels = listed(tuple(names.values()))
+    labels = choices(names.values())
     if animation is None:
         if len(names) > 1:
             raise UsageError(f"{path}: has {len(names)} animations: {labels}. {CHOOSE_ANIMATION}")

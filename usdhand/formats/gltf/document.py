@@ -7,7 +7,7 @@ import binascii
 import json
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,11 +15,11 @@ from typing import Any, NoReturn
 from urllib.parse import unquote, unquote_to_bytes
 
 from usdhand.errors import InputError
+from usdhand.problems import CHOICES, listed
 
 MAGIC = b"glTF"
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 LARGEST = 1e9  # metres and scales beyond are damage, and would overflow in products
-MOST_NAMED = 8  # names in a message
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,10 +286,9 @@ def _quoted(text: str) -> str:
     return repr(text if len(text) < 100 else text[:100] + "...")
 
 
-def listed(names: tuple[str, ...]) -> str:
-    """Some names, for a message."""
-    more = "" if len(names) <= MOST_NAMED else f" and {len(names) - MOST_NAMED} more"
-    return ", ".join(repr(name) for name in names[:MOST_NAMED]) + more
+def choices(names: Iterable[str]) -> str:
+    """Names to choose from, for a message."""
+    return listed([repr(name) for name in names], CHOICES)
 
 
 def unused(name: str, taken: dict[str, int]) -> str:

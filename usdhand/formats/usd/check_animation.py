@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdSkel
 
-from usdhand.formats.usd.check_skeleton import some
 from usdhand.formats.usd.stage import binding_prim
 from usdhand.motion import leaf_name
-from usdhand.problems import Problem
+from usdhand.problems import Problem, listed
 
 UNIT_TOLERANCE = 1e-3
 TIME_TOLERANCE = 1e-6  # time codes
@@ -59,19 +58,19 @@ def _binding_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
 def _joint_findings(skeleton: Usd.Prim, source: Usd.Prim) -> Iterator[Problem]:
     where = str(source.GetPath())
     known = {str(joint) for joint in UsdSkel.Skeleton(skeleton).GetJointsAttr().Get() or ()}
-    listed = [str(joint) for joint in UsdSkel.Animation(source).GetJointsAttr().Get() or ()]
-    unknown = [joint for joint in listed if joint not in known]
-    if len(unknown) == len(listed):
+    animated = [str(joint) for joint in UsdSkel.Animation(source).GetJointsAttr().Get() or ()]
+    unknown = [joint for joint in animated if joint not in known]
+    if len(unknown) == len(animated):
         yield Problem(
             "no-joints-animated",
-            f"it animates no joint of {skeleton.GetPath()}; it lists {some(listed) or 'none'}",
+            f"it animates no joint of {skeleton.GetPath()}; it lists {listed(animated) or 'none'}",
             where,
             "error",
         )
     elif unknown:
         yield Problem(
             "unknown-joints",
-            f"{len(unknown)} animated joints are not in {skeleton.GetPath()}: {some(unknown)}",
+            f"{len(unknown)} animated joints are not in {skeleton.GetPath()}: {listed(unknown)}",
             where,
             "warning",
         )
@@ -168,7 +167,7 @@ def _track_findings(track: SampledAttribute) -> Iterator[Problem]:
         if bad.any():
             names = [track.joints[int(j)] for j in np.flatnonzero(bad.any(axis=0))]
             frames = [whole[int(i)] for i in np.flatnonzero(bad.any(axis=1))]
-            yield replace(rule, message=f"{rule.message}: {some(names)} {track.at(frames)}")
+            yield replace(rule, message=f"{rule.message}: {listed(names)} {track.at(frames)}")
 
 
 def _number_rules(

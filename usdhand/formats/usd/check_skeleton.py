@@ -14,9 +14,8 @@ from usdhand.formats.usd.names import illegal_names, legal_name
 from usdhand.formats.usd.poses import MISPLACED_BIND_CM
 from usdhand.formats.usd.world import world_problems
 from usdhand.motion import leaf_name, parents_from_paths
-from usdhand.problems import Problem, Severity
+from usdhand.problems import Problem, Severity, listed
 
-SHOWN = 3  # examples in one message
 # What may be wrong with a pose: it is not there, has another length, or no usable matrices.
 POSE_PROBLEMS = {
     "bind": (
@@ -55,19 +54,19 @@ def _name_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
         yield Problem(
             "illegal-joint-name",
             f"{len(illegal)} joint names are not legal prim names: USD then sees no hierarchy and "
-            f"Blender makes no bones. Rename {some(renamed)}",
+            f"Blender makes no bones. Rename {listed(renamed)}",
             where,
             "error",
         )
     double = [joint for joint, count in Counter(joints).items() if count > 1]
     if double:
-        yield Problem("duplicate-joint", f"listed twice: {some(double)}", where, "error")
+        yield Problem("duplicate-joint", f"listed twice: {listed(double)}", where, "error")
     shared = [n for n, count in Counter(map(leaf_name, dict.fromkeys(joints))).items() if count > 1]
     if shared:
         yield Problem(
             "duplicate-joint-name",
             f"{len(shared)} names belong to several joints, which tools that drop the hierarchy "
-            f"confuse: {some(shared)}",
+            f"confuse: {listed(shared)}",
             where,
             "warning",
         )
@@ -80,7 +79,7 @@ def _order_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
         yield Problem(
             "joint-order",
             f"{len(late)} joints are listed before their parents, so UsdSkel refuses the "
-            f"skeleton: {some(late)}",
+            f"skeleton: {listed(late)}",
             where,
             "error",
         )
@@ -103,7 +102,7 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
             yield replace(other_length, message=message)
         elif singular := [joints[int(j)] for j in np.flatnonzero(~_usable(matrices))]:
             message = f"{len(singular)} {name} transforms are singular or not numbers"
-            yield replace(bad, message=f"{message}: {some(singular)}")
+            yield replace(bad, message=f"{message}: {listed(singular)}")
         else:
             poses[name] = matrices
     if len(poses) == 2:
@@ -114,7 +113,7 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
             yield Problem(
                 "identity-bind",
                 f"{len(unplaced)} joints have an identity bind transform (Maya writes that where "
-                f"no skin uses a joint): {some([leaf_name(joints[j]) for j in unplaced])}",
+                f"no skin uses a joint): {listed([leaf_name(joints[j]) for j in unplaced])}",
                 where,
                 "warning",
             )
@@ -154,8 +153,3 @@ def _first_offsets(
 def _scale_above(prim: Usd.Prim) -> float:
     matrix: Gf.Matrix4d = UsdGeom.XformCache().GetLocalToWorldTransform(prim)
     return float(np.cbrt(abs(matrix.GetDeterminant3())))
-
-
-def some(names: Sequence[str]) -> str:
-    """A few of many names, for a message."""
-    return ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")

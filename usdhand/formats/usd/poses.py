@@ -13,7 +13,7 @@ from usdhand.formats.usd.world import World
 from usdhand.motion import Skeleton
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import affine, local_matrices, rigid, unit
-from usdhand.problems import Problem
+from usdhand.problems import Problem, listed
 
 MISPLACED_BIND_CM = 1.0
 
@@ -128,5 +128,4 @@ def _repair_unskinned(
         f"{len(repaired)} joints have an identity bind transform (no skin uses them) and are "
         "placed by the first frame"
     )
-    where = ", ".join(repaired[:3]) + (", ..." if len(repaired) > 3 else "")
-    return replace(skeleton, bind=bind), (Problem("identity-bind", message, where),)
+    return replace(skeleton, bind=bind), (Problem("identity-bind", message, listed(repaired)),)

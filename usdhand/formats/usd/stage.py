@@ -14,9 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.problems import Problem
-
-MOST_NAMED = 8  # skeletons in a message
+from usdhand.problems import CHOICES, Problem, listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +204,7 @@ def binding_prim(skeleton: Usd.Prim) -> Usd.Prim:
 def choose_skeleton(path: Path, skeletons: list[Usd.Prim], skel: str | None) -> Usd.Prim:
     """Return the skeleton that ``skel`` means, or the one that is there; see `find_character`."""
     paths = [str(s.GetPath()) for s in skeletons]
-    names = ", ".join(paths[:MOST_NAMED]) + (", ..." if len(paths) > MOST_NAMED else "")
+    names = listed(paths, CHOICES)
     if skel is None:
         animated = [s for s in skeletons if bound_animation(s)]
         if len(skeletons) == 1:
