@@ -123,11 +123,13 @@ def test_names_without_a_side_and_a_finger_fewer(rig: str, missing: str) -> None
 
 @pytest.mark.parametrize("rig", UNSIDED)
 def test_side_from_words_around(rig: str) -> None:
-    # The hand is a left one: the word is believed, not the shape.
+    # The hand is a left one, whatever the word above it says.
     named: dict[Joint, str] = {("left", role): n for (_, role), n in RIGS[rig].items()}
     named[None, "hips"] = "RightHandRoot"
     skeleton, _ = build(named)
-    assert tuple(map_character(skeleton).hands) == ("right",)
+    found = map_character(skeleton)
+    assert tuple(found.hands) == ("left",)
+    assert "left and right by the hand's shape, against the names" in found.contradictions[0]
     both: dict[Joint, str] = {
         (s, role): f"{s}_{n}" for s in SIDES for (_, role), n in RIGS[rig].items()
     }

@@ -82,7 +82,8 @@ def test_aliases_win_over_names() -> None:
     assert found_joints(found) == {j: i for j, i in at.items() if j in RIGS["vrm1"]}
     bare = map_character(replace(skeleton, aliases=()))
     assert bare.convention == "vroid"
-    assert bare.hands["right"].wrist == at["left", "wrist"]
+    assert bare.hands["left"].wrist == at["left", "wrist"]
+    assert any("against the names" in note for note in bare.contradictions)
 
 
 def test_tips_are_found_beside_aliases() -> None:

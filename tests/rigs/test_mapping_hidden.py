@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders.rigs import HAND, Joint, found_joints, from_points
+from builders.misleading import MISLEADING, renamed
+from builders.rigs import HAND, Joint, found_joints, from_points, known_rigs
 from conftest import REPOSITORY, shared_data
 from hypothesis import given
 from hypothesis import strategies as st
@@ -339,3 +340,37 @@ def test_webxr_hands_with_a_hierarchy(side: Side) -> None:
 def test_bodies_without_fingers_are_refused(name: str) -> None:
     skeleton = read_character(shared_data("bvh", "animated-drawings", f"{name}.bvh")).skeleton
     assert verdict(hidden(skeleton), {}) == "refused"
+
+
+# --- names that mislead -------------------------------------------------------------------------
+
+CONVENTIONS = {name: rig for name, rig in known_rigs().items() if ("right", "IndexMCP") in rig}
+POSES = {"as it is": moved(np.eye(3)), "curled": fist(35), "in metres": moved(np.eye(3) / 100)}
+
+
+@pytest.mark.parametrize("change", MISLEADING)
+@pytest.mark.parametrize("rig", FILES)
+def test_names_in_the_wrong_places_do_not_mislead(rig: str, change: str) -> None:
+    """Every rig with the names of every third convention, permuted, shifted and exchanged."""
+    for name in sorted(CONVENTIONS)[len(rig + change) % 3 :: 3]:
+        skeleton, truth = known(rig)
+        named = renamed(skeleton, truth, CONVENTIONS[name], MISLEADING[change])
+        assert verdict(named, truth) == "right", name
+
+
+@given(
+    rig=st.sampled_from(sorted(FILES)),
+    convention=st.sampled_from(sorted(CONVENTIONS)),
+    change=st.sampled_from(sorted(MISLEADING)),
+    pose=st.sampled_from(sorted(POSES)),
+    mirrored=st.booleans(),
+    prefix=st.sampled_from(["", "Hero:", "rig_"]),
+)
+def test_misleading_names_on_bodies_of_all_kinds(
+    rig: str, convention: str, change: str, pose: str, mirrored: bool, prefix: str
+) -> None:
+    skeleton, truth = POSES[pose](*known(rig))
+    named = renamed(skeleton, truth, CONVENTIONS[convention], MISLEADING[change], prefix)
+    if mirrored:
+        named, truth = moved(np.diag([-1.0, 1, 1]))(named, truth)
+    assert verdict(named, truth) == "right"

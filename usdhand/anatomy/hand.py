@@ -8,7 +8,7 @@ rotation about the bone; for the thumb ``z`` is flexion.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from usdhand.display import displayed
@@ -87,7 +87,8 @@ class CharacterMap:
     """The hands of a character and the body joints that go with them.
 
     ``convention`` names the rig convention that matched ("geometry" where names were unknown);
-    ``notes`` say in words what was guessed.
+    ``notes`` say in words what was guessed, ``contradictions`` those of them where the bind pose
+    says otherwise than names do; ``evidence`` says what each hand was found by.
     """
 
     hands: Mapping[Side, HandMap]
@@ -97,3 +98,13 @@ class CharacterMap:
     neck: int | None = None
     head: int | None = None
     notes: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
+    evidence: tuple[str, ...] = ()
+
+    def corrected(self, *contradictions: str) -> CharacterMap:
+        """The map with more notes on names that the bind pose contradicts."""
+        return replace(
+            self,
+            notes=(*self.notes, *contradictions),
+            contradictions=(*self.contradictions, *contradictions),
+        )

@@ -9,6 +9,7 @@ from usdhand.anatomy import Hands
 from usdhand.anatomy.channels import is_flexion
 from usdhand.anatomy.hand import CharacterMap, HandMap
 from usdhand.motion import Clip
+from usdhand.problems import Problem
 from usdhand.report.document import rounded
 from usdhand.report.text import problems_data, table
 
@@ -35,6 +36,10 @@ def inspect_result(clip: Clip, hands: Hands | None, animated: bool = True) -> di
             result["channels"] = _channel_ranges(clip, hands)
             result["off_axis_share"] = _off_axis_shares(clip, hands)
         result["notes"] = list(hands.notes)
+        against = [
+            Problem("misleading-name", message) for message in hands.character.contradictions
+        ]
+        result["problems"] += problems_data(against)
     return result
 
 
@@ -65,6 +70,7 @@ def map_data(clip: Clip, character: CharacterMap) -> dict[str, Any]:
         "neck": name(character.neck),
         "head": name(character.head),
         "notes": list(character.notes),
+        "evidence": list(character.evidence),
     }
 
 
@@ -125,7 +131,8 @@ def _text(result: Mapping[str, Any], verbose: bool) -> str:
         lines.append(f"  no hands: {result['hand_error']}")
     else:
         lines += _hand_lines(result, verbose)
-    lines += [f"  note: {note}" for note in result.get("notes", ())]
+    warned = {p["message"] for p in result["problems"]}
+    lines += [f"  note: {note}" for note in result.get("notes", ()) if note not in warned]
     lines += [
         f"  {p['severity']}: {p['message']}" + (f" ({p['where']})" if p["where"] else "")
         for p in result["problems"]
@@ -152,6 +159,7 @@ def _hand_lines(result: Mapping[str, Any], verbose: bool) -> list[str]:
         ]
         lines += ["    " + line for line in table([head, *numbers], right=(1, 2, 3)).splitlines()]
     if verbose:
+        lines += [f"    evidence: {said}" for said in result["evidence"]]
         for side, hand in result["hands"].items():
             lines += [f"    {side} {name}: {path}" for name, path in hand["joints"].items()]
     return lines

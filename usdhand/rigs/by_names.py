@@ -69,7 +69,7 @@ def _character(
     if any(m.rank[:-1] == match.rank[:-1] and m.rank[-1] < match.rank[-1] for m in matches):
         name = match.convention.name
         notes.append(f"names are read as those of {name}, by the position of the thumb")
-    body = _body(rig, match.body, [h.wrist for h in hands.values()])
+    body: dict[str, Any] = _body(rig, match.body, [h.wrist for h in hands.values()])
     return CharacterMap(hands, match.convention.name, **body, notes=tuple(notes))
 
 

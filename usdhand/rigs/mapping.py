@@ -15,8 +15,8 @@ from usdhand.rigs.by_shape import FoundHand, find_hands, hand_size
 from usdhand.rigs.convention_match import is_hand
 from usdhand.rigs.conventions import Conventions, load_conventions
 from usdhand.rigs.joint_names import ADVICE, NamedJoints
-from usdhand.rigs.judge import judged_arms, judged_digits
-from usdhand.rigs.sides import sides_of
+from usdhand.rigs.judge import judged_arms, judged_hands
+from usdhand.rigs.sides import BY_WORDS, judged_sides, sides_of
 
 
 def map_character(skeleton: Skeleton, conventions: Conventions | None = None) -> CharacterMap:
@@ -57,7 +57,7 @@ def _found(rig: NamedJoints, conventions: Conventions) -> CharacterMap:
     if aliased and (found := match_names(aliased, conventions)):
         return _with_unnamed_digits(rig, found)
     if found := match_names(rig, conventions):
-        found = judged_digits(rig, _with_unnamed_digits(rig, found))
+        found = judged_hands(rig, _with_unnamed_digits(rig, found), conventions.explicit)
     else:
         found = _hands_by_shape(rig, conventions)
     return named_body(aliased, found, conventions) if aliased else found
@@ -109,7 +109,11 @@ def _hands_by_shape(rig: NamedJoints, conventions: Conventions) -> CharacterMap:
     if len(hands) == 1:
         others = f" ({'; '.join(reasons[:3])})" if reasons else ""
         notes.append(f"only a {sides[0]} hand was found{others}")
-    return CharacterMap(hands, "geometry", notes=tuple(notes))
+    evidence = [f"{side} hand by its shape alone" for side in hands]
+    named = how == BY_WORDS
+    evidence += [] if named else [f"left and right by {how}"]
+    found_map = CharacterMap(hands, "geometry", notes=tuple(notes), evidence=tuple(evidence))
+    return judged_sides(rig, found_map) if named and not conventions.explicit else found_map
 
 
 def _pair(rig: NamedJoints, found: Sequence[FoundHand], notes: list[str]) -> Sequence[FoundHand]:

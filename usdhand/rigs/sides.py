@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from usdhand.anatomy.hand import FINGERS, SIDES, Side, digit_joints
+from usdhand.anatomy.hand import FINGERS, SIDES, CharacterMap, HandMap, Side, digit_joints
 from usdhand.errors import HandNotFoundError
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
@@ -15,6 +16,9 @@ from usdhand.rigs.body import body_of
 from usdhand.rigs.by_shape import FoundHand
 from usdhand.rigs.conventions import named_side
 from usdhand.rigs.joint_names import ADVICE, NamedJoints
+
+BY_WORDS = "words in the joint names"
+OTHER_SIDE: Mapping[Side, Side] = {"left": "right", "right": "left"}
 
 
 def sides_of(rig: NamedJoints, found: Sequence[FoundHand]) -> tuple[list[Side], str]:
@@ -27,7 +31,7 @@ def sides_of(rig: NamedJoints, found: Sequence[FoundHand]) -> tuple[list[Side], 
     """
     named = [_named_side(rig, hand) for hand in found]
     if None not in named and len(set(named)) == len(named):
-        return [s for s in named if s], "words in the joint names"
+        return [s for s in named if s], BY_WORDS
     shapes = [chirality(rig.points, h.wrist, h.joints) for h in found]
     above = [_side_above(rig, hand) for hand in found]
     if len(found) == 1:
@@ -53,6 +57,38 @@ def sides_of(rig: NamedJoints, found: Sequence[FoundHand]) -> tuple[list[Side], 
     against = " and ".join(k for k, v in votes.items() if v * total < 0)
     how += f" (against {against})" if against else ""
     return (["left", "right"] if total > 0 else ["right", "left"]), how
+
+
+def judged_sides(rig: NamedJoints, found: CharacterMap) -> CharacterMap:
+    """Left and right by the feet and by the hands' own shape, where these contradict the names.
+
+    A body that was mirrored has its names on the wrong side, and a left hand is then shaped like a
+    right one.
+    """
+    hands = [found.hands[side] for side in SIDES if side in found.hands]
+    shapes = [chirality(rig.points, hand.wrist, hand.joints) for hand in hands]
+    if len(hands) == 1:
+        agrees = 0.0 if shapes[0] is None else 1.0 if shapes[0] == hands[0].side else -1.0
+        votes, sure = {"the hand's shape": agrees}, True
+    else:
+        votes = _votes_for_first_left(rig.skeleton, rig.points, hands, shapes)
+        del votes["the thumbs"]
+        sure = votes["the feet"] < 0 or None not in shapes
+    witnesses = [who for who, vote in votes.items() if vote < 0]
+    if not witnesses or not sure or max(votes.values()) > 0:
+        others = [who for who, vote in votes.items() if vote > 0]
+        told = ["names", *others] if others else ["names alone"]
+        said = f"left and right by {' and '.join(told)}"
+        against = f", against {' and '.join(witnesses)}" if witnesses else ""
+        return replace(found, evidence=(*found.evidence, said + against))
+    found = replace(
+        found,
+        hands={OTHER_SIDE[h.side]: replace(h, side=OTHER_SIDE[h.side]) for h in reversed(hands)},
+    )
+    return found.corrected(
+        f"left and right by {' and '.join(witnesses)}, against the names: "
+        + " and ".join(f"{OTHER_SIDE[h.side]} is {rig.path(h.wrist)}" for h in hands)
+    )
 
 
 def _named_side(rig: NamedJoints, hand: FoundHand) -> Side | None:
@@ -114,7 +150,10 @@ def chirality(points: Array, wrist: int, joints: Mapping[str, int]) -> Side | No
 
 
 def _votes_for_first_left(
-    skeleton: Skeleton, points: Array, hands: Sequence[FoundHand], shapes: Sequence[Side | None]
+    skeleton: Skeleton,
+    points: Array,
+    hands: Sequence[FoundHand | HandMap],
+    shapes: Sequence[Side | None],
 ) -> dict[str, float]:
     """Votes on two hands: positive where the first is the left one, zero where nothing is known.
 
@@ -141,13 +180,15 @@ def _votes_for_first_left(
 
 
 def _thumbs_ahead(
-    points: Array, hands: Sequence[FoundHand], away: Array, up: Array
+    points: Array, hands: Sequence[FoundHand | HandMap], away: Array, up: Array
 ) -> Array | None:
     """Level direction of both thumbs, None unless the hands mirror each other as in a bind pose.
 
     There the fingers point outward or down and the palms down or to the body, so that the thumbs
     point forward, if not to the sides. ``away`` leads from the second hand to the first.
     """
+    if not all("ThumbIP" in hand.joints for hand in hands):
+        return None
     thumbs, outward = [], []
     for hand, way in zip(hands, (away, -away), strict=True):
         roots = [points[hand.joints[d + "MCP"]] for d in FINGERS if d + "MCP" in hand.joints]

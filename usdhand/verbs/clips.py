@@ -51,6 +51,18 @@ def find_hands(
         raise HandNotFoundError(f"{name}: {error}") from error
 
 
+def misleading_names(clip: Clip, conventions: Conventions | None = None) -> tuple[Problem, ...]:
+    """Warnings where the bind pose contradicts joint names; none without hands."""
+    try:
+        character = map_character(clip.skeleton, conventions)
+    except HandNotFoundError:
+        return ()
+    file = str(clip.origin.path or "")
+    return tuple(
+        Problem("misleading-name", message, file=file) for message in character.contradictions
+    )
+
+
 def write_clip(
     clip: Clip,
     output: str | Path,

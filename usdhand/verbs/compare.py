@@ -11,7 +11,7 @@ from usdhand.motion import Clip
 from usdhand.report.compare import compare_result, summary
 from usdhand.requests.compare import CompareRequest
 from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands
+from usdhand.verbs.clips import find_hands, misleading_names
 from usdhand.verbs.outcome import Journal, Outcome
 
 
@@ -50,6 +50,7 @@ def run(request: CompareRequest, journal: Journal) -> Outcome:
     a, b = read_clip(request.a, request.skel), read_clip(request.b, request.skel_b or request.skel)
     for clip in (a, b):
         journal.about(clip.origin.path, clip.problems)
+        journal.about(clip.origin.path, misleading_names(clip, conventions), "warning")
     found = compare(a, b, align=request.align, conventions=conventions)
     code, most = 0, request.max_rms
     if most is not None and not found.rms_deg <= most:

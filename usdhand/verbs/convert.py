@@ -45,7 +45,7 @@ from usdhand.problems import Problem
 from usdhand.report.convert import convert_result, summary
 from usdhand.requests.convert import ConvertRequest, Edits, UpAxis
 from usdhand.rigs import Conventions, load_conventions, map_character
-from usdhand.verbs.clips import find_hands
+from usdhand.verbs.clips import find_hands, misleading_names
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -307,6 +307,9 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
         result |= convert_result(done.source, done.clip, done.animated, done.lost, conventions)
         journal.about(job.path, done.source.problems, "warning")
         journal.about(job.target, done.lost, "warning")
+        if request.onto is not None:
+            for clip in (done.source, done.clip):
+                journal.about(job.path, misleading_names(clip, conventions), "warning")
         if not request.dry_run:
             result["output"] = str(job.target)
             written.append(job.target)

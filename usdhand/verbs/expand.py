@@ -15,7 +15,7 @@ from usdhand.reduce.method import expand as expand_channels
 from usdhand.report.expand import expand_result, summary
 from usdhand.requests.expand import ExpandRequest
 from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands, write_clip
+from usdhand.verbs.clips import find_hands, misleading_names, write_clip
 from usdhand.verbs.outcome import Journal, Outcome
 
 
@@ -75,6 +75,7 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
     else:
         motion = _expanded_onto(stored, onto, skel, conventions)
     journal.about(motion.origin.path, motion.problems, "warning")
+    journal.about(motion.origin.path, misleading_names(motion, conventions), "warning")
     if not request.dry_run:
         lost = write_clip(
             motion,

@@ -30,7 +30,7 @@ from usdhand.report.plots.style import check_plots
 from usdhand.requests.fill import FillRequest
 from usdhand.requests.shared import sides
 from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands
+from usdhand.verbs.clips import find_hands, misleading_names
 from usdhand.verbs.finger_joints import add_fingers, lacks_fingers
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -148,6 +148,7 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
         journal.warn("damaged", message)
     clip = _read_body(request)
     journal.about(request.body, clip.problems, "warning")
+    journal.about(request.body, misleading_names(clip, conventions), "warning")
     added = add_fingers(request, clip, library, conventions, journal)
     filled = fill_fingers(
         added.grafted.clip if added else clip,

@@ -29,7 +29,7 @@ from usdhand.requests.splice import SpliceRequest
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.splice.method import Spliced, splice
 from usdhand.splice.settings import Pin, SpliceSettings
-from usdhand.verbs.clips import find_hands
+from usdhand.verbs.clips import find_hands, misleading_names
 from usdhand.verbs.outcome import Journal, Outcome
 
 if TYPE_CHECKING:
@@ -176,6 +176,7 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
         journal.warn("same-file", "body and hand clip are the same", body)
     for read in (clip, hand_clip):
         journal.about(read.origin.path, read.problems, "warning")
+        journal.about(read.origin.path, misleading_names(read, conventions), "warning")
     spliced = splice_hands(
         clip,
         hand_clip,
