@@ -21,6 +21,8 @@ class Reading:
     animation : name of the animation where there are several (never in USD)
     cm_per_unit : centimetres of one unit, instead of what the file says or what is guessed
     up : "Y" or "Z", likewise
+    positions : "replace" or "add": what position channels of a BVH joint do with its OFFSET; None
+        if they replace it, unless the body would collapse to a point
     """
 
     skel: str | None = option(
@@ -38,6 +40,12 @@ class Reading:
     )
     up: Literal["Y", "Z"] | None = option(
         "Up axis of an input that is not USD.", "--input-up", default=None, key="input_up"
+    )
+
+    positions: Literal["replace", "add"] | None = option(
+        "Whether position channels of a BVH joint replace its OFFSET or are added to it. By "
+        "default they replace it, unless the body would collapse to a point.",
+        default=None,
     )
 
     def __post_init__(self) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from usdhand.errors import InputError
+from usdhand.formats.bvh.encoding import encoding_of, is_wide
 from usdhand.formats.bvh.hierarchy import Hierarchy, line_at, parse_hierarchy
 from usdhand.formats.bvh.numbers import RowError, compiled_rows, plain_rows
 from usdhand.motion.rotations import Array
@@ -49,7 +50,10 @@ def parse_file(path: Path) -> BvhFile:
             data = file.read(HEAD)
             if not _MOTION.search(data):
                 data += file.read()
-            hierarchy = parse_hierarchy(data, path)
+            if is_wide(data):
+                raise InputError(f"{path}: the file is UTF-16 text. Save it as UTF-8.")
+            encoding, unsure = encoding_of(data)
+            hierarchy = parse_hierarchy(data, path, encoding)
             declared, time, start = _motion_header(data, hierarchy.motion, path)
             fps, problems = _frame_rate(time)
             size, shape = path.stat().st_size, (declared, hierarchy.width)
@@ -78,7 +82,7 @@ def parse_file(path: Path) -> BvhFile:
     if hierarchy.width and found > declared:
         message = f"the file declares {declared} frames and has {found}; all of them are read"
         problems = (*problems, Problem("more-frames", message))
-    return BvhFile(hierarchy, rows, fps, problems)
+    return BvhFile(hierarchy, rows, fps, (*unsure, *problems))
 
 
 def _large() -> int:

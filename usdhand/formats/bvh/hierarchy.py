@@ -93,15 +93,15 @@ def line_at(data: bytes, position: int) -> int:
     return sum(1 for _ in _LINE_END.finditer(data, 0, position)) + 1
 
 
-def parse_hierarchy(data: bytes, path: Path) -> Hierarchy:
-    """Read up to the word MOTION.
+def parse_hierarchy(data: bytes, path: Path, encoding: str = "utf-8") -> Hierarchy:
+    """Read up to the word MOTION, with names in an encoding.
 
     Raises
     ------
     InputError
         naming the line.
     """
-    parser = _Parser(data, path)
+    parser = _Parser(data, path, encoding)
     nodes = parser.nodes()
     kept = _without_empty_ends(nodes)
     return Hierarchy(
@@ -116,8 +116,8 @@ def parse_hierarchy(data: bytes, path: Path) -> Hierarchy:
 class _Parser:
     """Words one after the other, with an own stack: depth costs no recursion."""
 
-    def __init__(self, data: bytes, path: Path) -> None:
-        self.data, self.path = data, path
+    def __init__(self, data: bytes, path: Path, encoding: str) -> None:
+        self.data, self.path, self.encoding = data, path, encoding
         self.position = self.start = 3 if data.startswith(b"\xef\xbb\xbf") else 0
 
     def nodes(self) -> list[Node]:
@@ -156,7 +156,7 @@ class _Parser:
         rest = _REST_OF_LINE.match(self.data, self.position)
         assert rest is not None
         self.position = rest.end()
-        name = " ".join(_text(rest[0]).split())
+        name = " ".join(self.text(rest[0]).split())
         parent = stack[-1] if stack else -1
         if key != "END" and not 0 < len(name) <= LONGEST_NAME:
             self.fail(f"{key} has no name, or one that is too long")
@@ -204,7 +204,7 @@ class _Parser:
             comments = _COMMENTS.match(self.data, match.start())
             if comments is None or not self.starts_line(match.start()):
                 self.start, self.position = match.span()
-                return _text(match[0])
+                return self.text(match[0])
             self.position = comments.end()
         self.start = self.position = len(self.data)
         return ""
@@ -215,16 +215,13 @@ class _Parser:
             position -= 1
         return position == 0 or self.data[position - 1] in b"\r\n"
 
+    def text(self, data: bytes) -> str:
+        """What bytes of the file say; what is not in its encoding is marked."""
+        return data.decode(self.encoding, "replace")
+
     def fail(self, what: str) -> NoReturn:
         """Refuse the file at the last word read."""
         raise InputError(f"{self.path}, line {line_at(self.data, self.start)}: {what}.")
-
-
-def _text(data: bytes) -> str:
-    try:
-        return data.decode()
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
 
 
 def _without_empty_ends(nodes: list[Node]) -> list[Node]:

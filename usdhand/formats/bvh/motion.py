@@ -28,13 +28,20 @@ def local_motion(hierarchy: Hierarchy, rows: Array) -> tuple[Array, Array]:
         # Each block goes on in the half space that the one before it ended in.
         joined = slice(max(start - 1, 0), start + BLOCK)
         rotations[joined] = rot.make_continuous(rotations[joined])
-    translations = np.broadcast_to(hierarchy.offsets, (frames, joints, 3))
-    places = _position_columns(hierarchy)
+    return rotations, local_translations(hierarchy, rows)
+
+
+def local_translations(hierarchy: Hierarchy, rows: Array, added: bool = False) -> Array:
+    """Joint-to-parent translations (frames, joints, 3); positions of inner joints may be added."""
+    shape = (len(rows), len(hierarchy.joints), 3)
+    translations = np.broadcast_to(hierarchy.offsets, shape)
+    places = position_columns(hierarchy)
     if places:
         translations = translations.copy()
         for joint, axis, column in places:
-            translations[:, joint, axis] = rows[:, column]
-    return rotations, translations
+            inner = added and hierarchy.parents[joint] >= 0
+            translations[:, joint, axis] = rows[:, column] + inner * hierarchy.offsets[joint, axis]
+    return translations
 
 
 def from_euler(axes: tuple[int, ...], angles: Array) -> Array:
@@ -68,7 +75,7 @@ def _rotation_groups(
     }
 
 
-def _position_columns(hierarchy: Hierarchy) -> list[tuple[int, int, int]]:
+def position_columns(hierarchy: Hierarchy) -> list[tuple[int, int, int]]:
     """(joint, axis, column) of each position channel."""
     kinds = [
         (joint, *channel)

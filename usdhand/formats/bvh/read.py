@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,29 +11,31 @@ import numpy as np
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.bvh.file import BvhFile, parse_file
 from usdhand.formats.bvh.hierarchy import Hierarchy
-from usdhand.formats.bvh.motion import local_motion
+from usdhand.formats.bvh.motion import local_motion, local_translations
 from usdhand.formats.bvh.pose import choose_bind, posed_skeleton
 from usdhand.formats.guess import guess_units, guess_up
 from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.motion import Clip, Origin, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import IDENTITY, Y_UP_FROM_Z_UP, Array
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted, listed
 
 LOOKED_AT = 40  # frames that the up axis is guessed from
 # Joints times frames that need as much memory as any motion; more only if most joints move.
 PLENTY = 10_000_000
 STILL_JOINTS = 4  # joints a channel, at most, beyond that
 NEAR_ZERO = 0.25  # of the OFFSET
+COLLAPSED = 0.5  # of all joints, with positions near zero: no body has that pose
 
 
 def read_clip(path: Path, reading: Reading = DEFAULT) -> Clip:
     """Read a BVH file.
 
     The channels of a joint turn it in their order, the first outermost; its position channels stand
-    in place of its OFFSET. End Sites are joints named after the one that they end, ``Head_End``.
-    The bind pose is the one of all channels zero; where no body stands in that, the first frame in
-    which it does. What the file does not say is guessed, and said in ``problems``.
+    in place of its OFFSET, or are added to it (`Reading.positions`). End Sites are joints named
+    after the one that they end, ``Head_End``. The bind pose is the one of all channels zero; where
+    no body stands in that, the first frame in which it does. What the file does not say is guessed,
+    and said in ``problems``.
 
     Parameters
     ----------
@@ -84,7 +86,11 @@ def _posed(path: Path, reading: Reading) -> Clip:
     hierarchy, rows = file.hierarchy, file.rows
     _check_size(path, hierarchy, len(rows))
     rotations, translations = local_motion(hierarchy, rows)
-    problems = [*file.problems, *_channel_problems(hierarchy, translations)]
+    near = _near_zero(hierarchy, translations) if reading.positions is None else []
+    collapsed = len(near) > COLLAPSED * len(hierarchy.joints)
+    if reading.positions == "add" or collapsed:
+        translations = local_translations(hierarchy, rows, added=True)
+    problems = [*file.problems, *_channel_problems(hierarchy, near, collapsed)]
     if cm_per_unit is None:
         cm_per_unit, guessed = guess_units(hierarchy.offsets, hierarchy.parents, hierarchy.names)
         problems.append(guessed)
@@ -171,19 +177,38 @@ def _placed(clip: Clip, cm_per_unit: float, up: str) -> Clip:
     return replace(clip, rotations=rotations, translations=translations)
 
 
-def _channel_problems(hierarchy: Hierarchy, translations: Array) -> Iterator[Problem]:
-    kinds = [{kind for kind, _ in channels} for channels in hierarchy.channels]
-    scaled = [name for name, own in zip(hierarchy.names, kinds, strict=True) if "scale" in own]
+def _near_zero(hierarchy: Hierarchy, translations: Array) -> list[int]:
+    """Inner joints whose positions stay near zero, far from the OFFSET that they replace."""
+    found = []
+    offsets = np.linalg.norm(hierarchy.offsets, axis=-1)
+    for joint, channels in enumerate(hierarchy.channels):
+        if len(translations) and any(kind == "position" for kind, _ in channels):
+            usual = float(np.median(np.linalg.norm(translations[:, joint], axis=-1)))
+            if usual < NEAR_ZERO * offsets[joint]:
+                found.append(joint)
+    return found
+
+
+def _channel_problems(
+    hierarchy: Hierarchy, near_zero: Sequence[int], collapsed: bool
+) -> Iterator[Problem]:
+    scaled = [
+        name
+        for name, channels in zip(hierarchy.names, hierarchy.channels, strict=True)
+        if any(kind == "scale" for kind, _ in channels)
+    ]
     if scaled:
         message = f"{len(scaled)} joints have scale channels, e.g. '{scaled[0]}': not read"
         yield Problem("scale-channels", message)
-    offsets = np.linalg.norm(hierarchy.offsets, axis=-1)
-    for joint, own in enumerate(kinds):
-        if "position" in own and len(translations):
-            usual = float(np.median(np.linalg.norm(translations[:, joint], axis=-1)))
-            if usual < NEAR_ZERO * offsets[joint]:
-                message = (
-                    "the positions stay near zero, far from the OFFSET that they replace: the "
-                    "program that wrote them may have meant them as additions to it"
-                )
-                yield Problem("near-zero-positions", message, hierarchy.joints[joint])
+    if near_zero:
+        done = (
+            "they are added to it, since the body would collapse to a point otherwise. If that is "
+            "wrong, give --positions replace"
+            if collapsed
+            else "the program that wrote them may have meant them as additions to it. If so, give "
+            "--positions add"
+        )
+        joints = counted(len(near_zero), "joint")
+        message = f"positions of {joints} stay near zero, far from the OFFSET that they replace: "
+        where = listed([hierarchy.joints[j] for j in near_zero])
+        yield Problem("near-zero-positions", message + done, where)
