@@ -68,8 +68,11 @@ def _matches(
 
         hands: dict[Side | None, Candidates] = {}
         for side, roles in names_of.items():
+            spelled = convention.hands[side]
             found = {
-                role: js for role, names in roles.items() if (js := joints(lookup[side], names))
+                role: _spelled(rig, js, spelled.get(role, ()))
+                for role, names in roles.items()
+                if (js := joints(lookup[side], names))
             }
             if is_hand(found):
                 hands[side] = found
@@ -82,6 +85,17 @@ def _matches(
         body["chest"] = tuple(j for js in chests for j in js)
         rank = _rank(rig, convention, prefix, suffix, hands, body, moved)
         yield ConventionMatch(convention, prefix, suffix, hands, body, rank)
+
+
+def _spelled(rig: NamedJoints, joints: tuple[int, ...], names: Sequence[str]) -> tuple[int, ...]:
+    """Of joints whose names differ in separators only, those with the convention's own spelling.
+
+    Helpers of MakeHuman and others are called like the joint they help, with other separators.
+    """
+    if len(joints) < 2:
+        return joints
+    exact = tuple(j for j in joints if rig.names[j].endswith(tuple(names)))
+    return exact or joints
 
 
 def is_hand(roles: Mapping[str, object]) -> bool:
