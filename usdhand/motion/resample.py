@@ -29,6 +29,19 @@ def interpolate_rotations(rotations: Array, frames: Array) -> Array:
     return _sampled(rotations, frames, slerp)
 
 
+def at_frames(clip: Clip, frames: Array) -> Clip:
+    """Return the clip at fractional frame numbers (n,), its ends held.
+
+    They need not be even, so that its own frame rate and times say nothing of them.
+    """
+    return replace(
+        clip,
+        rotations=interpolate_rotations(clip.rotations, frames),
+        translations=interpolate(clip.translations, frames),
+        scales=interpolate(clip.scales, frames),
+    )
+
+
 def resample(clip: Clip, fps: float) -> Clip:
     """Return the clip at another frame rate, over the same time span.
 
@@ -70,14 +83,7 @@ def resample_like(body: Clip, other: Clip) -> Clip:
         ),
         time_codes_per_frame=quotient(per_second, other.fps),
     )
-    return replace(
-        body,
-        rotations=interpolate_rotations(body.rotations, frames),
-        translations=interpolate(body.translations, frames),
-        scales=interpolate(body.scales, frames),
-        fps=other.fps,
-        origin=origin,
-    )
+    return replace(at_frames(body, frames), fps=other.fps, origin=origin)
 
 
 def _sampled(

@@ -27,10 +27,14 @@ USUAL_FPS = (*GRID_FPS, *map(float, _OTHERS))
 SPARSE = 12.0 * 0.999  # frames a second: sparser keys are keys of curves, not frames
 DENSE = 1000.0  # frames a second: denser keys, in a file that does not say its rate, are none
 UNEVEN, UNEVEN_CODES = 0.05, 1e-3  # frames: how far seconds and time codes may lie off steady ones
+UNSEEN = 1e-6  # frames: a key this near to a frame is the frame's
 SAME_CODE = 1e-9  # time codes: two keys this near are one
 DRIFT = 2e-4  # relative: a rate this near to a usual one is that one, badly rounded
 MILLISECONDS = 6e-4  # seconds: times rounded to milliseconds
 FLOAT32 = 1.2e-7  # relative: times rounded to single precision
+FASTEST_TIME_CODES = 240.0  # a second; above, time codes are ticks rather than frames
+HALF_KNOWN = 0.7  # frames: times rounded more coarsely tell no frame
+BY_CHANCE = 0.01  # how likely any times with gaps may lie on a grid
 EXACT = 2e-5  # seconds: times as a rate makes them, summed up with rounding
 
 _LARGEST_DENOMINATOR = 1_000_000
@@ -162,10 +166,24 @@ class Timing:
 
     @property
     def times(self) -> Array:
-        """(count,) times of the frames, those of the keys where each frame has one."""
-        if self.rhythm != "uneven" and len(self.keys) == self.count:
+        """(count,) times of the frames, those of the keys where a frame has one."""
+        steady = time_codes(np.arange(self.count, dtype=np.float64), self.start, self.step)
+        if self.rhythm == "uneven":
+            return steady
+        if len(self.keys) == self.count:
             return self.keys
-        return time_codes(np.arange(self.count, dtype=np.float64), self.start, self.step)
+        frames = np.round((self.keys - self.start) / self.step).astype(np.intp)
+        steady[frames] = self.keys
+        return steady
+
+    @property
+    def all_times(self) -> Array:
+        """Times of the frames, and of the keys that lie between or after them."""
+        own, keys = self.times, self.keys
+        after = np.searchsorted(own, keys)
+        around = own[np.clip(after - 1, 0, None)], own[np.clip(after, None, len(own) - 1)]
+        away = np.minimum(*(np.abs(keys - times) for times in around))
+        return np.sort(np.concatenate([own, keys[away > UNSEEN * self.step]]))
 
     def frames(self, times: Array) -> Array:
         """Frame numbers of key times; those meant to lie on a frame do so exactly."""
@@ -189,7 +207,7 @@ def find_timing(curves: Sequence[Array], clock: Clock | None = None) -> Timing:
         fps = clock.frame_rate or DEFAULT_FPS
         return Timing(keys, quotient(clock.per_second, fps), fps, 1, "one key")
     if clock.frame_rate is not None:
-        return _steady(keys, clock) or _over_codes(keys, clock.per_second, clock.frame_rate)
+        return _over_codes(keys, clock, clock.frame_rate)
     rounding = EXACT + FLOAT32 * float(np.abs(keys).max())
     return _steady(keys, clock, rounding) or _on_grid(keys, rounding) or _over_seconds(keys)
 
@@ -234,12 +252,66 @@ def _simplest(keys: Array, step: float) -> float:
     return simple if np.array_equal(time_codes(frames, first, simple), keys) else step
 
 
-def _over_codes(keys: Array, per_second: float, frame_rate: float) -> Timing:
-    """Frames of the rate that the file says, or a finer one on whose frames all keys lie."""
+def _over_codes(keys: Array, clock: Clock, frame_rate: float) -> Timing:
+    """Frames of the rate that the file says, unless its time codes are no frames.
+
+    Seconds, milliseconds and other ticks have the rate that the times themselves tell.
+    """
+    steady = _steady(keys, clock)
+    if SPARSE <= clock.per_second <= FASTEST_TIME_CODES:
+        return steady or _over_frames(keys, clock.per_second, frame_rate)
+    if steady and min(abs(fps / steady.fps - 1.0) for fps in USUAL_FPS) < 1e-6:
+        return steady
+    typical = clock.per_second / float(np.median(np.diff(keys)))
+    found = _over_rounded(keys, clock.per_second, frame_rate) or steady
+    if found or typical < SPARSE or frame_rate >= SPARSE:
+        return found or _over_frames(keys, clock.per_second, frame_rate)
+    fps = _about(typical)
+    return _resampled(keys, quotient(clock.per_second, fps), fps, 1e-3)
+
+
+def _over_frames(keys: Array, per_second: float, frame_rate: float) -> Timing:
+    """Frames of the stated rate, or a finer one on whose frames all keys lie."""
     step, shortest = quotient(per_second, frame_rate), float(np.diff(keys).min())
     if step / 20 <= shortest < step and _residual(keys, shortest) < UNEVEN_CODES * shortest:
         step = _simplest(keys, shortest)
     return _resampled(keys, step, quotient(per_second, step), 1e-6)
+
+
+def _over_rounded(keys: Array, per_second: float, frame_rate: float) -> Timing | None:
+    """Frames of a usual rate whose times, rounded or cut off, are these keys, gaps allowed."""
+    seconds = (keys - keys[0]) / per_second
+    largest = EXACT + FLOAT32 * float(np.abs(keys).max()) / per_second
+    unit = max(_last_digit(keys) / per_second, largest) * (1 + 1e-6)
+    every = np.arange(len(keys), dtype=np.float64)
+    rates = [fps for fps in (frame_rate, *USUAL_FPS) if fps >= SPARSE and fps * unit < HALF_KNOWN]
+
+    def off(fps: float, frames: Array) -> float:
+        return float(np.ptp(seconds - frames / fps))
+
+    exact_rates = [fps for fps in rates if off(fps, every) <= unit]
+    if exact_rates:
+        whole = [fps for fps in exact_rates if fps == int(fps)] or exact_rates
+        fps = min(whole, key=lambda fps: (fps != frame_rate, off(fps, every)))
+        return Timing(keys, quotient(per_second, fps), fps, len(keys), "rounded")
+    for fps in rates:
+        frames = np.round(seconds * fps)
+        chance = (fps * unit) ** (len(keys) - 1)
+        neighbours = bool((np.diff(frames) == 1).any())
+        tells = chance < BY_CHANCE and (neighbours or fps == frame_rate)
+        if tells and (np.diff(frames) > 0).all() and off(fps, frames) <= unit:
+            rhythm: Rhythm = "rounded" if neighbours else "sparse"
+            step = quotient(per_second, fps)
+            return Timing(keys, step, fps, int(frames[-1]) + 1, rhythm)
+    return None
+
+
+def _last_digit(keys: Array) -> float:
+    """Return the place of the last decimal that any key has: .01 for 0.03 and 0.1; 0 for none."""
+    for digits in range(6):
+        if np.abs(keys - np.round(keys, digits)).max() <= SAME_CODE:
+            return float(10.0**-digits)
+    return 0.0
 
 
 def _on_grid(keys: Array, rounding: float) -> Timing | None:
@@ -260,8 +332,12 @@ def _on_grid(keys: Array, rounding: float) -> Timing | None:
 def _over_seconds(keys: Array) -> Timing:
     """Frames of a usual rate that is about as fine as the keys are."""
     typical = 1.0 / float(np.median(np.diff(keys)))
-    fps = min((24.0, 30.0, 60.0, 120.0), key=lambda rate: abs(np.log(rate / max(typical, 30.0))))
+    fps = _about(typical)
     return _resampled(keys, 1.0 / fps, fps, 1e-3)
+
+
+def _about(typical: float) -> float:
+    return min((24.0, 30.0, 60.0, 120.0), key=lambda rate: abs(np.log(rate / max(typical, 30.0))))
 
 
 def _resampled(keys: Array, step: float, fps: float, slack: float) -> Timing:

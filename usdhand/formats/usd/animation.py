@@ -16,7 +16,9 @@ from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import world_above
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
+from usdhand.motion.resample import at_frames
 from usdhand.motion.rotations import Array
+from usdhand.motion.timing import time_codes
 
 VARIANT_SET = "fingers"
 
@@ -27,7 +29,8 @@ class Kept:
 
     Attributes
     ----------
-    times : time codes of the frames
+    times : time codes of the frames, and those of the input's samples between them
+    frames : what each of ``times`` is in frames of the clip, None where they are its frames
     elements, places : which of the input's elements belong to which joints
     changed : joints that come from the clip all the same, or that the input does not have
     """
@@ -37,6 +40,7 @@ class Kept:
     elements: Places
     places: Places
     changed: NDArray[np.intp]
+    frames: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +99,8 @@ def author_animation(
     joints.default = Vt.TokenArray(list(clip.skeleton.joints))
     kept = _kept(character, clip, changed)
     times = clip.time_codes if kept is None else kept.times
+    if kept is not None and kept.frames is not None:
+        clip = at_frames(clip, kept.frames)
     rotations, translations, scales = _file_curves(character, clip, times, kept)
     types = Sdf.ValueTypeNames
     for name, value_type, curve, dtype, convert in (
@@ -143,14 +149,17 @@ def _kept(character: Character, clip: Clip, changed: Sequence[int]) -> Kept | No
     animation = UsdSkel.Animation(character.animation)
     targets = joint_targets(animation, clip.skeleton.joints)
     tracks = Tracks.of(animation, len(targets))
-    times = frame_timing(character.stage, tracks.times)[0].times
-    if len(times) != len(clip) or not np.allclose(times, clip.time_codes, rtol=1e-12, atol=1e-6):
+    timing = frame_timing(character.stage, tracks.times)[0]
+    codes = time_codes(np.arange(timing.count, dtype=np.float64), timing.start, timing.step)
+    if len(codes) != len(clip) or not np.allclose(codes, clip.time_codes, rtol=1e-12, atol=1e-6):
         return None
+    times = timing.all_times  # what does not change must miss no sample
+    frames = (times - timing.start) / timing.step if len(times) > len(clip) else None
     every = np.arange(len(clip.skeleton))
     whole = np.array_equal(targets, every)
     elements = EVERY if whole else np.flatnonzero(targets >= 0)
     own = np.flatnonzero(np.isin(every, changed) | ~np.isin(every, targets))
-    return Kept(times, tracks.at(times), elements, targets[elements], own)
+    return Kept(times, tracks.at(times), elements, targets[elements], own, frames)
 
 
 def _file_curves(

@@ -20,13 +20,13 @@ from usdhand.formats.usd.write import (
     bind_animation,
     check_name,
     copy_blend_shapes,
-    extend_time,
     free_child,
     instances_above,
     layer_over,
     save_flat,
     save_layer,
     stage_files,
+    within_samples,
 )
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion.rotations import Array
@@ -237,8 +237,8 @@ def _author_motion(
         if source is not None:
             copy_blend_shapes(layer, path, UsdSkel.Animation(source))
         bind_animation(layer, character, path)
-    layer.startTimeCode, layer.endTimeCode = float(times[0]), float(times[-1])
-    extend_time(layer, times)
+    if changed or not within_samples(character, times):
+        layer.startTimeCode, layer.endTimeCode = float(times[0]), float(times[-1])
 
 
 def _mend_skeleton(prim: Usd.Prim, own: Skeleton, poses: AuthoredPoses, local: Array) -> None:

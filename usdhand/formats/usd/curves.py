@@ -12,12 +12,18 @@ from pxr import Usd, UsdSkel
 from usdhand.errors import InputError
 from usdhand.formats.usd.samples import EVERY, Track, blocks, open_track
 from usdhand.motion.rotations import Array
-from usdhand.motion.timing import MOST_FRAMES, Clock, Timing, find_timing
+from usdhand.motion.timing import (
+    FASTEST_TIME_CODES,
+    MOST_FRAMES,
+    SPARSE,
+    Clock,
+    Timing,
+    find_timing,
+)
 from usdhand.problems import Problem
 
 UNIT_TOLERANCE = 1e-6  # of a squared norm: what rounding to float32 leaves
 SHORTEST = 1e-6  # squared norm below which a quaternion has no direction
-FASTEST_TIME_CODES = 240.0  # above, time codes are ticks rather than frames
 USUAL_FPS = 24.0  # of a stage that counts ticks and does not say its frame rate
 
 Fault = tuple[NDArray[np.bool_], str]  # (samples, joints) that cannot be used, and what they are
@@ -152,6 +158,12 @@ def frame_timing(stage: Usd.Stage, samples: list[Array]) -> tuple[Timing, tuple[
     else:
         rate = said if 0 < said < np.inf else USUAL_FPS
     timing = find_timing(samples, Clock(per_second, rate))
+    if timing.rhythm == "rounded" and not SPARSE <= per_second <= FASTEST_TIME_CODES:
+        message = (
+            f"{per_second:g} time codes a second are no frames: {timing.fps:g} frames a second are "
+            f"read, on which its {len(timing.keys)} samples lie, rounded"
+        )
+        return timing, (Problem("guessed-fps", message),)
     if timing.rhythm != "uneven":
         return timing, ()
     count, first, last = len(timing.keys), timing.keys[0], timing.keys[-1]

@@ -18,6 +18,7 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.add_joints import author_joints, joint_tokens
 from usdhand.formats.usd.animation import author_animation, author_variants
 from usdhand.formats.usd.character import as_on_stage
+from usdhand.formats.usd.curves import Tracks
 from usdhand.formats.usd.flatten import flat_layer
 from usdhand.formats.usd.stage import (
     Character,
@@ -39,6 +40,7 @@ from usdhand.formats.usd.textures import (
     unpacked_beside,
 )
 from usdhand.motion import Clip
+from usdhand.motion.timing import SAME_CODE
 from usdhand.problems import Problem
 
 ANIMATION_NAME = "HandMotion"
@@ -117,7 +119,8 @@ def write_motion(
         if character.animation is not None:
             copy_blend_shapes(layer, animation, UsdSkel.Animation(character.animation))
         bind_animation(layer, character, animation)
-        extend_time(layer, times)
+        if not within_samples(character, times):  # else the input says what of them is shown
+            extend_time(layer, times)
         if author is not None:
             author(layer, root)
     return save_layer(layer, output, flatten=flatten)
@@ -337,6 +340,17 @@ def bind_animation(layer: Sdf.Layer, character: Character, animation: Sdf.Path) 
         prim, "skel:animationSource", custom=False
     )
     relationship.targetPathList.explicitItems = [animation]
+
+
+def within_samples(character: Character, times: NDArray[np.float64]) -> bool:
+    """Whether a stage with a time range has its motion sampled over all of these time codes."""
+    if character.animation is None or not character.stage.HasAuthoredTimeCodeRange():
+        return False
+    found = Tracks.of(UsdSkel.Animation(character.animation), 0).times
+    if not found:
+        return False
+    first, last = min(t[0] for t in found), max(t[-1] for t in found)
+    return bool(first - SAME_CODE <= times[0] and times[-1] <= last + SAME_CODE)
 
 
 def extend_time(layer: Sdf.Layer, times: NDArray[np.float64]) -> None:
