@@ -68,9 +68,13 @@ class LocalMotion:
         """Points (3, frames) in the axes of one joint, in those of another one."""
         up, down = self._path(start, end)
         for j in up:
+            if j in self.clip.shears:
+                points = self.clip.shears[j] @ points
             points = self.translation(j) + rotate(self.rotation(j), self.scale(j) * points)
         for j in down:
             points = rotate(inverse(self.rotation(j)), points - self.translation(j)) / self.scale(j)
+            if j in self.clip.shears:
+                points = np.linalg.inv(self.clip.shears[j]) @ points
         return points
 
     def turn(self, joint: int, reference: int) -> Array:

@@ -20,6 +20,7 @@ from usdhand.fill.settings import FillSettings
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import orientation
 
 # What a fill is compared with. "best candidate" looks at the truth: no choice could do better.
 METHODS = ("fill", "nearest", "random", "mean pose", "rest pose", "best candidate")
@@ -153,7 +154,7 @@ def _rest_curves(clip: Clip, hands: Hands, names: tuple[str, ...]) -> Array:
     local = clip.skeleton.bind_locals
     pose = replace(
         clip,
-        rotations=rot.from_matrix(local[None, :, :3, :3]),
+        rotations=rot.from_matrix(orientation(local[None, :, :3, :3])),
         translations=clip.translations[:1],
         scales=clip.scales[:1],
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from usdhand.motion.arrays import ArrayRig, Quaternions, UpAxis, rate_of
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
 from usdhand.motion.timing import time_codes
-from usdhand.motion.transforms import decompose_trs, with_even_signs
+from usdhand.motion.transforms import decompose, with_even_signs
 from usdhand.problems import Problem
 
 
@@ -44,6 +44,11 @@ class Origin:
     up_axis: str = "Y"
 
 
+def shears_of(matrices: Array) -> dict[int, Array]:
+    """Return those of the shears (joints, 3, 3) that are any, by joint."""
+    return {j: matrix for j, matrix in enumerate(matrices) if (matrix != np.eye(3)).any()}
+
+
 @displayed(
     lambda clip: {
         "name": clip.name,
@@ -65,6 +70,8 @@ class Clip:
     rotations : (frames, joints, 4) joint-to-parent unit quaternions (x, y, z, w), continuous
     translations : (frames, joints, 3) joint-to-parent, cm
     scales : (frames, joints, 3); all ones for nearly every clip, all negative for a mirrored joint
+    shears : joint -> (3, 3), before its scale in all frames; only of joints that are not animated
+        and whose rest transform has one
     fps : frames a second
     source : what the clip was read from, to be written over; None for a clip made in memory. Only
         `usdhand.formats` looks inside. The stage of a USD file is held open by it: replace it by
@@ -80,16 +87,25 @@ class Clip:
     origin: Origin = field(default_factory=Origin)
     problems: tuple[Problem, ...] = ()
     source: object | None = field(default=None, repr=False)
+    shears: Mapping[int, Array] = field(default_factory=dict, repr=False)
 
     @classmethod
     def at_bind_pose(
         cls, skeleton: Skeleton, name: str, origin: Origin, problems: tuple[Problem, ...] = ()
     ) -> Clip:
         """Return one frame of a skeleton at its bind pose, with a time code a frame."""
-        translations, rotations, _ = decompose_trs(skeleton.bind_locals[None])
-        scales = np.ones_like(translations)
-        fps = origin.time_codes_per_second
-        return cls(skeleton, rotations, translations, scales, fps, name, origin, problems)
+        translations, rotations, scales, shears = decompose(skeleton.bind_locals[None])
+        return cls(
+            skeleton,
+            rotations,
+            translations,
+            scales,
+            origin.time_codes_per_second,
+            name,
+            origin,
+            problems,
+            shears=shears_of(shears[0]),
+        )
 
     @classmethod
     def from_arrays(

@@ -76,18 +76,20 @@ def forward_kinematics(
 
 
 def scaled_joints(clip: Clip, tolerance: float = 1e-4) -> frozenset[int]:
-    """Joints whose scale differs from one somewhere."""
+    """Joints whose scale differs from one somewhere, or that have a shear."""
     scales = clip.scales[:1] if clip.scales.strides[0] == 0 else clip.scales  # one value for all
     # Thirty times faster than the largest difference from one over frames and axes at once.
     rows = scales.reshape(len(scales), -1)
     away = np.maximum(rows.max(axis=0) - 1.0, 1.0 - rows.min(axis=0)) > tolerance
-    return frozenset(np.flatnonzero(away.reshape(-1, 3).any(axis=1)).tolist())
+    return frozenset(np.flatnonzero(away.reshape(-1, 3).any(axis=1)).tolist()) | clip.shears.keys()
 
 
 def _scaled_matrix(
     clip: Clip, joint: int, parent_matrix: Array | None, parent_rotation: Array | None
 ) -> Array:
     own = rot.to_matrix(clip.rotations[:, joint]) * clip.scales[:, joint, None, :]
+    if joint in clip.shears:
+        own = own @ clip.shears[joint]
     if parent_matrix is None:
         parent_matrix = None if parent_rotation is None else rot.to_matrix(parent_rotation)
     return own if parent_matrix is None else np.asarray(parent_matrix @ own)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
 
+ROUNDED = 1e-5  # what rounding leaves in the linear part of a rotation
 FLAT = 1e-12  # a singular value up to this flattens everything
 # Each quaternion component of a diagonal matrix of ones and minus ones, four times, less one.
 _HALF_TURNS: Array = np.array(
@@ -50,6 +51,23 @@ def decompose_trs(matrices: Array) -> tuple[Array, Array, Array]:
     linear = matrices[..., :3, :3]
     scales = np.linalg.norm(linear, axis=-2) * _handedness(linear)[..., None]
     return matrices[..., :3, 3], rot.from_matrix(orientation(linear)), scales
+
+
+def decompose(matrices: Array) -> tuple[Array, Array, Array, Array]:
+    """Translations, quaternions, scales and shears of matrices (..., 4, 4), nothing left out.
+
+    A shear (..., 3, 3) comes before the scale, and is the identity of nearly every matrix. Scales
+    and shears that rounding explains are exactly none.
+    """
+    linear = matrices[..., :3, :3]
+    translations, quaternions, scales = decompose_trs(matrices)
+    turned = nearest_rotation(linear)
+    whole = np.abs(linear - turned).max(axis=(-1, -2)) <= ROUNDED
+    scales = np.where(whole[..., None], 1.0, scales)
+    unscaled = np.swapaxes(rot.to_matrix(quaternions), -1, -2) @ linear
+    shears = unscaled / scales[..., :, None]
+    straight = whole | (np.abs(shears - np.eye(3)).max(axis=(-1, -2)) <= ROUNDED)
+    return translations, quaternions, scales, np.where(straight[..., None, None], np.eye(3), shears)
 
 
 def nearest_rotation(linear: Array) -> Array:

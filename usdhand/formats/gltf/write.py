@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -89,7 +90,14 @@ def write_clip(clip: Clip, path: Path) -> tuple[Problem, ...]:
         path.write_bytes(_json(document))
     else:
         path.write_bytes(_glb(_json(document), data))
-    return problems
+    return (*problems, *_left_out(clip))
+
+
+def _left_out(clip: Clip) -> Iterator[Problem]:
+    if clip.shears:
+        joint = clip.skeleton.joints[min(clip.shears)]
+        message = f"glTF has no shear: that of {len(clip.shears)} joints is left out"
+        yield Problem("sheared", message, joint)
 
 
 @dataclass(frozen=True, eq=False)

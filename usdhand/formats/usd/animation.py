@@ -10,17 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, UsdSkel, Vt
 
+from usdhand.formats.usd.add_joints import joint_tokens
 from usdhand.formats.usd.curves import Tracks, frame_timing, joint_targets
+from usdhand.formats.usd.poses import authored_poses
 from usdhand.formats.usd.samples import EVERY, Places, Track, blocks, steady
 from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import world_above
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
+from usdhand.motion.kinematics import scaled_joints
 from usdhand.motion.resample import at_frames
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import time_codes
+from usdhand.motion.transforms import ROUNDED, compose_trs, rigid
+from usdhand.problems import Problem
 
 VARIANT_SET = "fingers"
+AT_REST = 1e-6  # of the largest number in a rest transform: below, a joint has not left it
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +75,12 @@ class FileCurve:
         moves = self.track is not None and not self.track.still
         return not moves and steady(self.values, self.own) and steady(self.root_values)
 
+    def joint(self, joint: int) -> Array:
+        """(frames, n) of one joint of the clip, not yet divided by ``unit``."""
+        if joint in self.roots:
+            return self.root_values[:, list(self.roots).index(joint)]
+        return self.values[:, joint]
+
     def rows(self, dtype: Any) -> Iterator[NDArray[Any]]:
         """Values frame by frame; made block by block, in the processor's cache."""
         among_own = np.searchsorted(self.own, self.roots)
@@ -86,9 +98,11 @@ class FileCurve:
 def author_animation(
     layer: Sdf.Layer, path: Sdf.Path, character: Character, clip: Clip, changed: Sequence[int]
 ) -> Array:
-    """Define a SkelAnimation with all joints of a clip, and return its time codes.
+    """Define a SkelAnimation with the joints of a clip, and return its time codes.
 
     Joints other than ``changed`` keep the input's values to the bit where it has these frames.
+    Joints that stay at a rest transform with a scale or shear are left to it: a SkelAnimation has
+    no shear, and rounds scales to half precision.
     """
     prim = Sdf.CreatePrimInLayer(layer, path)
     prim.specifier = Sdf.SpecifierDef
@@ -96,12 +110,14 @@ def author_animation(
     joints = Sdf.AttributeSpec(
         prim, "joints", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform
     )
-    joints.default = Vt.TokenArray(list(clip.skeleton.joints))
     kept = _kept(character, clip, changed)
     times = clip.time_codes if kept is None else kept.times
     if kept is not None and kept.frames is not None:
         clip = at_frames(clip, kept.frames)
-    rotations, translations, scales = _file_curves(character, clip, times, kept)
+    curves = rotations, translations, scales = _file_curves(character, clip, times, kept)
+    resting = _resting(character, clip, curves)
+    listed = EVERY if not resting else np.setdiff1d(np.arange(len(clip.skeleton)), resting)
+    joints.default = Vt.TokenArray(np.array(clip.skeleton.joints)[listed].tolist())
     types = Sdf.ValueTypeNames
     for name, value_type, curve, dtype, convert in (
         ("rotations", types.QuatfArray, rotations, np.float32, Vt.QuatfArray.FromNumpy),
@@ -109,7 +125,7 @@ def author_animation(
         ("scales", types.Half3Array, scales, np.float16, Vt.Vec3hArray.FromNumpy),
     ):
         attribute = Sdf.AttributeSpec(prim, name, value_type)
-        rows = curve.rows(dtype)
+        rows = (np.ascontiguousarray(row[listed]) for row in curve.rows(dtype))
         if name != "rotations" and curve.still:  # Blender wants samples of rotations
             attribute.default = convert(next(rows))
             continue
@@ -117,6 +133,33 @@ def author_animation(
         for time, row in zip(times.tolist(), rows, strict=True):
             layer.SetTimeSample(spec, time, convert(row))
     return times
+
+
+def animation_losses(layer: Sdf.Layer, path: Sdf.Path, clip: Clip) -> Iterator[Problem]:
+    """What a SkelAnimation, authored at ``path`` for a clip, has not of its rest transforms."""
+    listed = set(layer.GetAttributeAtPath(path.AppendProperty("joints")).default)
+    joints = clip.skeleton.joints
+    sheared = [j for j in sorted(clip.shears) if joints[j] in listed]
+    if sheared:
+        message = f"a SkelAnimation has no shear: that of {len(sheared)} joints that move is lost"
+        yield Problem("sheared", message, joints[sheared[0]])
+    rounded = [
+        j
+        for j in sorted(scaled_joints(clip))
+        if joints[j] in listed
+        and steady(clip.scales[:, j, None])
+        and np.abs(_half(clip.scales[0, j]) / clip.scales[0, j] - 1.0).max() > ROUNDED
+    ]
+    if rounded:
+        message = (
+            "a SkelAnimation has scales in half precision: that of "
+            f"{len(rounded)} joints is rounded, and what is below them moves"
+        )
+        yield Problem("rounded-scale", message, joints[rounded[0]])
+
+
+def _half(values: Array) -> Array:
+    return values.astype(np.float16).astype(np.float64)
 
 
 def author_variants(
@@ -160,6 +203,35 @@ def _kept(character: Character, clip: Clip, changed: Sequence[int]) -> Kept | No
     elements = EVERY if whole else np.flatnonzero(targets >= 0)
     own = np.flatnonzero(np.isin(every, changed) | ~np.isin(every, targets))
     return Kept(times, tracks.at(times), elements, targets[elements], own, frames)
+
+
+def _resting(
+    character: Character, clip: Clip, curves: tuple[FileCurve, FileCurve, FileCurve]
+) -> list[int]:
+    """Joints that stay at a rest transform which is no rotation and translation alone."""
+    unit = curves[1].unit
+    rest = authored_poses(character, len(joint_tokens(character)), unit)[0].rest
+    if rest is None:
+        return []
+    uneven = np.abs(rest - rigid(rest))[:, :3, :3].max(axis=(1, 2)) > ROUNDED
+    return [
+        j
+        for j in np.flatnonzero(uneven & np.isin(np.arange(len(rest)), curves[0].own)).tolist()
+        if _stays(j, rest[j], clip.shears.get(j), curves)
+    ]
+
+
+def _stays(
+    joint: int,
+    rest: Array,
+    shear: Array | None,
+    curves: tuple[FileCurve, FileCurve, FileCurve],
+) -> bool:
+    rotations, translations, scales = (curve.joint(joint) for curve in curves)
+    local = compose_trs(translations, rotations, scales)
+    if shear is not None:
+        local[..., :3, :3] = local[..., :3, :3] @ shear
+    return bool((np.abs(local - rest) <= AT_REST * np.abs(rest).max()).all())
 
 
 def _file_curves(

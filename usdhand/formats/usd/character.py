@@ -136,4 +136,5 @@ def _reordered(clip: Clip, order: Array) -> Clip:
         rotations=clip.rotations[:, order],
         translations=clip.translations[:, order],
         scales=clip.scales[:, order],
+        shears={int(place[j]): shear for j, shear in clip.shears.items()},
     )

@@ -10,7 +10,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.formats.usd.animation import author_animation
+from usdhand.formats.usd.animation import animation_losses, author_animation
 from usdhand.formats.usd.character import character_of, gf_matrices, legal_clip
 from usdhand.formats.usd.names import author_names, legal_skeleton
 from usdhand.formats.usd.poses import AuthoredPoses, authored_poses
@@ -119,8 +119,11 @@ def write_placed(
         changed = range(len(clip.skeleton)) if edited else ()
         variants = motion_variants(character)
         with Sdf.ChangeBlock():
-            _author_motion(layer, character, clip, changed, variants)
-        lost = tuple(_one_motion(*place) for place in variants)
+            path = _author_motion(layer, character, clip, changed, variants)
+        lost = (
+            *(_one_motion(*place) for place in variants),
+            *animation_losses(layer, path, clip),
+        )
     poses, _ = authored_poses(character, len(clip.skeleton), 1.0)
     local = _local_in_file(character, clip)
     stage.GetRootLayer().TransferContent(layer)
@@ -221,7 +224,7 @@ def _author_motion(
     clip: Clip,
     changed: Sequence[int],
     variants: Sequence[tuple[Sdf.Path, str, str]],
-) -> None:
+) -> Sdf.Path:
     source = character.animation
     shared = [s for s in find_skeletons(character.stage) if bound_animation(s) == source]
     if source is not None and len(shared) == 1 and not source.IsInstanceProxy():
@@ -239,6 +242,7 @@ def _author_motion(
         bind_animation(layer, character, path)
     if changed or not within_samples(character, times):
         layer.startTimeCode, layer.endTimeCode = float(times[0]), float(times[-1])
+    return path
 
 
 def _mend_skeleton(prim: Usd.Prim, own: Skeleton, poses: AuthoredPoses, local: Array) -> None:

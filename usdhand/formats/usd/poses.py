@@ -12,7 +12,7 @@ from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import World
 from usdhand.motion import Skeleton
 from usdhand.motion.rotations import Array
-from usdhand.motion.transforms import affine, local_matrices, rigid, unit
+from usdhand.motion.transforms import affine, local_matrices, unit
 from usdhand.problems import Problem, listed
 
 MISPLACED_BIND_CM = 1.0
@@ -27,14 +27,14 @@ class AuthoredPoses:
 
     def neutral_locals(self, parents: NDArray[np.intp]) -> Array:
         """Joint-to-parent matrices where an animation says nothing: rest, as USD defines it."""
-        return rigid(self.rest) if self.rest is not None else self.bind_locals(parents)
+        return self.rest if self.rest is not None else self.bind_locals(parents)
 
     def bind_locals(self, parents: NDArray[np.intp]) -> Array:
         """Joint-to-parent matrices of the bind pose, of the rest pose where there is no bind."""
         if self.bind is not None:
-            return rigid(local_matrices(self.bind, parents))
+            return local_matrices(self.bind, parents)
         if self.rest is not None:
-            return rigid(self.rest)
+            return self.rest
         return np.broadcast_to(np.eye(4), (len(parents), 4, 4))
 
 
@@ -83,7 +83,7 @@ def placed_skeleton(
         key=lambda b: _agreement(_bones(b, parents), posed, parents),
     )
     identity = np.abs(poses.bind - np.eye(4)).max(axis=(1, 2)) < 1e-6
-    return _repair_unskinned(replace(skeleton, bind=bind), first_frame, identity)
+    return _repair_unskinned(replace(skeleton, bind=bind), first_frame, posed, identity)
 
 
 def _matrices(value: object, count: int, scale: float) -> Array | None:
@@ -108,7 +108,7 @@ def _agreement(bones: Array, posed: Array, parents: NDArray[np.intp]) -> float:
 
 
 def _repair_unskinned(
-    skeleton: Skeleton, first_frame: Array, identity: NDArray[np.bool_]
+    skeleton: Skeleton, first_frame: Array, posed: Array, identity: NDArray[np.bool_]
 ) -> tuple[Skeleton, tuple[Problem, ...]]:
     """Place joints that no skin uses, for which Maya exports an identity bind transform."""
     bind = skeleton.bind.copy()
@@ -117,7 +117,7 @@ def _repair_unskinned(
         p = int(skeleton.parents[j])
         if p < 0 or not identity[j]:
             continue
-        expected = np.linalg.norm(first_frame[j, :3, 3])
+        expected = np.linalg.norm(posed[j, :3, 3] - posed[p, :3, 3])
         actual = np.linalg.norm(bind[j, :3, 3] - bind[p, :3, 3])
         if abs(actual - expected) > MISPLACED_BIND_CM:
             bind[j] = bind[p] @ first_frame[j]

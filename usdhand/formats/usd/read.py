@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,15 +21,16 @@ from usdhand.formats.usd.curves import (
     read_curve,
 )
 from usdhand.formats.usd.names import illegal_names, legal_name, with_names
-from usdhand.formats.usd.poses import AuthoredPoses, authored_poses, placed_skeleton
+from usdhand.formats.usd.poses import authored_poses, placed_skeleton
 from usdhand.formats.usd.samples import Track, steady
 from usdhand.formats.usd.stage import Character, damage_refused, find_character
 from usdhand.formats.usd.world import World, world_above, world_problems
 from usdhand.motion import Clip, Origin, parents_from_paths
 from usdhand.motion import rotations as rot
+from usdhand.motion.clip import shears_of
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS
-from usdhand.motion.transforms import compose_trs, with_even_signs
+from usdhand.motion.transforms import compose_trs, decompose, with_even_signs
 from usdhand.problems import Problem
 
 
@@ -91,12 +92,16 @@ def _animated_clip(character: Character) -> Clip:
     times = timing.times
     world = world_above(character.skeleton, times)
     poses, missing = authored_poses(character, len(joints), world.scale)
+    neutral = decompose(poses.neutral_locals(parents))
     rotations, translations, scales = _curves(
-        tracks.at(times), joints, targets, poses, world, len(times)
+        tracks.at(times), joints, targets, neutral, world.scale, len(times)
     )
     rotations, scales = with_even_signs(rotations, scales)
     q, t = _place(rotations, translations, parents, world)
-    skeleton, repaired = placed_skeleton(joints, parents, poses, world, compose_trs(t[0], q[0]))
+    shears = shears_of(neutral[3])
+    shears = {j: shear for j, shear in shears.items() if j not in targets}
+    first = _matrices(t[0], q[0], scales[0], shears)
+    skeleton, repaired = placed_skeleton(joints, parents, poses, world, first)
     skeleton = with_names(skeleton, character.skeleton)
     origin = replace(
         _origin(character, world),
@@ -119,7 +124,7 @@ def _animated_clip(character: Character) -> Clip:
             f"timeCodesPerSecond ({origin.time_codes_per_second:g})."
         )
     name = character.path.stem
-    return Clip(skeleton, q, t, scales, timing.fps, name, origin, problems, character)
+    return Clip(skeleton, q, t, scales, timing.fps, name, origin, problems, character, shears)
 
 
 def _still_clip(character: Character) -> Clip:
@@ -127,11 +132,11 @@ def _still_clip(character: Character) -> Clip:
     parents = parents_from_paths(joints)
     world = world_above(character.skeleton)
     poses, missing = authored_poses(character, len(joints), world.scale)
-    local = poses.bind_locals(parents)
-    q, t = _place(
-        rot.from_matrix(local[None, :, :3, :3]), local[None, :, :3, 3].copy(), parents, world
-    )
-    skeleton, repaired = placed_skeleton(joints, parents, poses, world, compose_trs(t[0], q[0]))
+    moved, turned, scales, sheared = decompose(poses.bind_locals(parents)[None])
+    q, t = _place(turned, moved.copy(), parents, world)
+    shears = shears_of(sheared[0])
+    first = _matrices(t[0], q[0], scales[0], shears)
+    skeleton, repaired = placed_skeleton(joints, parents, poses, world, first)
     skeleton = with_names(skeleton, character.skeleton)
     problems = (
         *character.problems,
@@ -142,8 +147,16 @@ def _still_clip(character: Character) -> Clip:
     )
     origin = _origin(character, world)
     fps = origin.time_codes_per_second
-    scales = np.ones_like(t)
-    return Clip(skeleton, q, t, scales, fps, character.path.stem, origin, problems, character)
+    name = character.path.stem
+    return Clip(skeleton, q, t, scales, fps, name, origin, problems, character, shears)
+
+
+def _matrices(t: Array, q: Array, scales: Array, shears: Mapping[int, Array]) -> Array:
+    """Joint-to-parent matrices (joints, 4, 4) of one frame."""
+    found = compose_trs(t, q, scales)
+    for joint, shear in shears.items():
+        found[joint, :3, :3] = found[joint, :3, :3] @ shear
+    return found
 
 
 def _targets(
@@ -164,17 +177,15 @@ def _curves(
     tracks: Tracks,
     joints: tuple[str, ...],
     targets: NDArray[np.intp],
-    poses: AuthoredPoses,
-    world: World,
+    neutral: tuple[Array, Array, Array, Array],
+    unit: float,
     frames: int,
 ) -> tuple[Array, Array, Array]:
     """Rotations, translations in cm and scales, the neutral pose where there are none.
 
     What does not move is a view of one row for all frames.
     """
-    neutral = poses.neutral_locals(parents_from_paths(joints))
-    turned, moved = rot.from_matrix(neutral[:, :3, :3]), neutral[:, :3, 3]
-    ones = np.ones_like(moved)
+    moved, turned, scaled, _ = neutral
 
     def curve(track: Track | None, unmoved: Array, finish: Finish, unit: float = 1.0) -> Array:
         if track is None:
@@ -189,8 +200,8 @@ def _curves(
 
     return (
         curve(tracks.rotations, turned, finish_rotations),
-        curve(tracks.translations, moved, finish_vectors(world.scale), world.scale),
-        curve(tracks.scales, ones, finish_vectors(1.0)),
+        curve(tracks.translations, moved, finish_vectors(unit), unit),
+        curve(tracks.scales, scaled, finish_vectors(1.0)),
     )
 
 

@@ -16,7 +16,7 @@ from usdhand.formats.output import check_output, written_beside
 from usdhand.formats.paths import relative_path
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.add_joints import author_joints, joint_tokens
-from usdhand.formats.usd.animation import author_animation, author_variants
+from usdhand.formats.usd.animation import animation_losses, author_animation, author_variants
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.curves import Tracks
 from usdhand.formats.usd.flatten import flat_layer
@@ -123,7 +123,8 @@ def write_motion(
             extend_time(layer, times)
         if author is not None:
             author(layer, root)
-    return save_layer(layer, output, flatten=flatten)
+    lost = () if variants else tuple(animation_losses(layer, animation, clips[""]))
+    return (*lost, *save_layer(layer, output, flatten=flatten))
 
 
 def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> tuple[Problem, ...]:

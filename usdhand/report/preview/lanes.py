@@ -62,6 +62,8 @@ def lane_data(lane: Lane, pack: Pack, max_frames: int) -> dict[str, Any]:
             f"long clip: the page has every {_ordinal(every)} of {len(clip)} frames "
             f"({clip.fps / every:.3g} a second) and interpolates between them"
         )
+    if clip.shears:
+        notes.append(f"the page does not show the shear of {len(clip.shears)} joints")
     drawn = _drawn(clip.skeleton, lane.hands)
     positions = forward_kinematics(clip).positions[:: max(every, len(clip) // 600)]
     data: dict[str, Any] = {
