@@ -187,6 +187,7 @@ def test_two_skeletons_under_one_binding_are_told_apart(tmp_path: Path) -> None:
     for name in ("joints", "bindTransforms", "restTransforms"):
         value = stage.GetPrimAtPath(stages.SKELETON).GetAttribute(name).Get()
         twin.GetPrim().GetAttribute(name).Set(value)
+    twin.GetJointsAttr().Set(["Elsewhere", *stages.JOINTS[1:]])
     stage.Save()
     character = find_character(path, "/Hero/Skel")
     write_motion(character, turned(clip_from_character(character)), HAND, tmp_path / "out.usda")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdSkel
 
-from usdhand.formats.usd.stage import binding_prim
+from usdhand.formats.usd.bindings import binding_prim, unapplied_bindings
 from usdhand.motion import leaf_name
 from usdhand.problems import Problem, listed
 
@@ -33,18 +33,21 @@ def _binding_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
     owner = binding_prim(skeleton)
     targets = UsdSkel.BindingAPI(owner).GetAnimationSourceRel().GetTargets()
     where = str(owner.GetPath())
-    if not targets:
+    unapplied = list(unapplied_bindings(skeleton))
+    yield from unapplied
+    if not targets and not unapplied:
         yield Problem("no-animation", "no animation is bound to the skeleton", where, "warning")
-    elif not (bound := skeleton.GetStage().GetPrimAtPath(targets[0])):
+    elif targets and not (bound := skeleton.GetStage().GetPrimAtPath(targets[0])):
         message = f"{targets[0]} is bound, but does not exist"
         yield Problem("no-such-animation", message, where, "error")
-    elif not bound.IsA(UsdSkel.Animation):
+    elif targets and not bound.IsA(UsdSkel.Animation):
         message = f"{targets[0]} is bound, but is not a SkelAnimation"
         yield Problem("no-such-animation", message, where, "error")
     prim = owner.GetParent()
     while prim and not prim.IsPseudoRoot():
         overruled = UsdSkel.BindingAPI(prim).GetAnimationSourceRel()
-        if overruled and overruled.GetTargets() not in ([], targets):
+        in_force = prim.HasAPI(UsdSkel.BindingAPI)
+        if in_force and overruled and overruled.GetTargets() not in ([], targets):
             yield Problem(
                 "lost-binding",
                 f"binds {overruled.GetTargets()[0]}, but the binding on {where} below has "

@@ -11,13 +11,13 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.animation import animation_losses, author_animation
+from usdhand.formats.usd.bindings import apply_api, bind_animation
 from usdhand.formats.usd.character import character_of, gf_matrices, legal_clip
 from usdhand.formats.usd.names import author_names, legal_skeleton
 from usdhand.formats.usd.poses import AuthoredPoses, authored_poses
 from usdhand.formats.usd.stage import Character, bound_animation, compose, find_skeletons
 from usdhand.formats.usd.world import world_above
 from usdhand.formats.usd.write import (
-    bind_animation,
     check_name,
     copy_blend_shapes,
     free_child,
@@ -119,8 +119,9 @@ def write_placed(
         changed = range(len(clip.skeleton)) if edited else ()
         variants = motion_variants(character)
         with Sdf.ChangeBlock():
-            path = _author_motion(layer, character, clip, changed, variants)
+            path, shared = _author_motion(layer, character, clip, changed, variants)
         lost = (
+            *shared,
             *(_one_motion(*place) for place in variants),
             *animation_losses(layer, path, clip),
         )
@@ -224,13 +225,14 @@ def _author_motion(
     clip: Clip,
     changed: Sequence[int],
     variants: Sequence[tuple[Sdf.Path, str, str]],
-) -> Sdf.Path:
+) -> tuple[Sdf.Path, tuple[Problem, ...]]:
     source = character.animation
     shared = [s for s in find_skeletons(character.stage) if bound_animation(s) == source]
     if source is not None and len(shared) == 1 and not source.IsInstanceProxy():
         path = source.GetPath()  # stronger samples replace the weaker ones as a whole
     else:
         path = free_child(character.stage, character.root.GetPath(), "Motion")
+    told: tuple[Problem, ...] = ()
     times = author_animation(layer, path, character, clip, changed)
     # What is authored here wins over variants: those of an animation would be without effect.
     own = [name for place, name, _ in variants if place == path]
@@ -239,10 +241,10 @@ def _author_motion(
     if source is None or path != source.GetPath() or variants:
         if source is not None:
             copy_blend_shapes(layer, path, UsdSkel.Animation(source))
-        bind_animation(layer, character, path)
+        told = bind_animation(layer, character, path)
     if changed or not within_samples(character, times):
         layer.startTimeCode, layer.endTimeCode = float(times[0]), float(times[-1])
-    return path
+    return path, told
 
 
 def _mend_skeleton(prim: Usd.Prim, own: Skeleton, poses: AuthoredPoses, local: Array) -> None:
@@ -260,8 +262,7 @@ def _mend_skeleton(prim: Usd.Prim, own: Skeleton, poses: AuthoredPoses, local: A
         skeleton.CreateRestTransformsAttr(gf_matrices(local))
     if poses.bind is None:
         skeleton.CreateBindTransformsAttr(gf_matrices(own.accumulated(local)))
-    if not prim.HasAPI(UsdSkel.BindingAPI):
-        UsdSkel.BindingAPI.Apply(prim)
+    apply_api(prim)
 
 
 def _rename(stage: Usd.Stage, renamed: dict[str, str]) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pxr import UsdGeom, UsdSkel
 
 from usdhand.errors import InputError
+from usdhand.formats.usd.bindings import unapplied_bindings, why_nothing_is_bound
 from usdhand.formats.usd.curves import (
     Finish,
     Tracks,
@@ -79,10 +80,7 @@ def bind_pose_clip(character: Character) -> Clip:
 
 def _animated_clip(character: Character) -> Clip:
     if character.animation is None:
-        raise InputError(
-            f"{character.path}: no animation is bound to {character.skeleton.GetPath()}. "
-            "Bind a SkelAnimation with skel:animationSource."
-        )
+        raise InputError(f"{character.path}: {why_nothing_is_bound(character.skeleton)}")
     animation = UsdSkel.Animation(character.animation)
     joints = _joints(character)
     parents = parents_from_paths(joints)
@@ -111,6 +109,7 @@ def _animated_clip(character: Character) -> Clip:
     )
     problems = (
         *character.problems,
+        *unapplied_bindings(character.skeleton),
         *_name_problems(character, joints),
         *world_problems(character.skeleton, times),
         *_animation_problems(animation, joints, targets, tracks),

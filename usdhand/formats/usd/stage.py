@@ -190,17 +190,6 @@ def bound_animation(skeleton: Usd.Prim) -> Usd.Prim | None:
     return prim if prim and prim.IsA(UsdSkel.Animation) else None
 
 
-def binding_prim(skeleton: Usd.Prim) -> Usd.Prim:
-    """Return the prim whose ``skel:animationSource`` is in force: overriding elsewhere loses."""
-    prim = skeleton
-    while prim and not prim.IsPseudoRoot():
-        relationship = UsdSkel.BindingAPI(prim).GetAnimationSourceRel()
-        if relationship and relationship.HasAuthoredTargets():
-            return prim
-        prim = prim.GetParent()
-    return skeleton
-
-
 def choose_skeleton(path: Path, skeletons: list[Usd.Prim], skel: str | None) -> Usd.Prim:
     """Return the skeleton that ``skel`` means, or the one that is there; see `find_character`."""
     paths = [str(s.GetPath()) for s in skeletons]

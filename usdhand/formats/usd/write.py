@@ -17,14 +17,13 @@ from usdhand.formats.paths import relative_path
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.add_joints import author_joints, joint_tokens
 from usdhand.formats.usd.animation import animation_losses, author_animation, author_variants
+from usdhand.formats.usd.bindings import bind_animation
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.curves import Tracks
 from usdhand.formats.usd.flatten import flat_layer
 from usdhand.formats.usd.stage import (
     Character,
-    binding_prim,
     compose,
-    find_skeletons,
     is_text,
     open_stage,
     readable,
@@ -118,13 +117,13 @@ def write_motion(
             times = author_animation(layer, animation, character, clips[""], changed)
         if character.animation is not None:
             copy_blend_shapes(layer, animation, UsdSkel.Animation(character.animation))
-        bind_animation(layer, character, animation)
+        shared = bind_animation(layer, character, animation)
         if not within_samples(character, times):  # else the input says what of them is shown
             extend_time(layer, times)
         if author is not None:
             author(layer, root)
     lost = () if variants else tuple(animation_losses(layer, animation, clips[""]))
-    return (*lost, *save_layer(layer, output, flatten=flatten))
+    return (*shared, *lost, *save_layer(layer, output, flatten=flatten))
 
 
 def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> tuple[Problem, ...]:
@@ -323,24 +322,6 @@ def copy_blend_shapes(layer: Sdf.Layer, path: Sdf.Path, source: UsdSkel.Animatio
             layer.SetTimeSample(spec.path, time, attribute.Get(time))
         if not times:
             spec.default = attribute.Get()
-
-
-def bind_animation(layer: Sdf.Layer, character: Character, animation: Sdf.Path) -> None:
-    """Make a character play an animation: override the binding that is in force."""
-    owner = binding_prim(character.skeleton)
-    sharing = [s for s in find_skeletons(character.stage) if binding_prim(s) == owner]
-    if len(sharing) > 1:  # a binding that other skeletons inherit stays theirs
-        owner = character.skeleton
-    prim = Sdf.CreatePrimInLayer(layer, owner.GetPath())
-    if not owner.HasAPI(UsdSkel.BindingAPI):
-        schemas = Sdf.TokenListOp()
-        schemas.prependedItems = ["SkelBindingAPI"]
-        prim.SetInfo("apiSchemas", schemas)
-    # A layer that is a copy of a stage in memory has one.
-    relationship = prim.relationships.get("skel:animationSource") or Sdf.RelationshipSpec(
-        prim, "skel:animationSource", custom=False
-    )
-    relationship.targetPathList.explicitItems = [animation]
 
 
 def within_samples(character: Character, times: NDArray[np.float64]) -> bool:
