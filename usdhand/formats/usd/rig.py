@@ -284,10 +284,24 @@ def _controllers(
 
 
 def _value(prim: Usd.Prim, channel: str, name: str, path: Path) -> Any:
-    value = prim.GetAttribute(f"{CHANNEL_PREFIX}:{channel}:{name}").Get()
+    attribute = prim.GetAttribute(f"{CHANNEL_PREFIX}:{channel}:{name}")
+    if _is_animated(attribute):
+        raise InputError(
+            f"{path}: '{name}' of channel '{channel}' is animated, which only the 'value' of a "
+            "free channel may be. Remove its time samples or spline"
+            + (f", or set usdhand:channel:{channel}:kind to 'free'." if name == "value" else ".")
+        )
+    value = attribute.Get()
     if value is None:
         raise InputError(f"{path}: channel '{channel}' of the rig has no '{name}'.")
     return value
+
+
+def _is_animated(attribute: Usd.Attribute) -> bool:
+    """Whether values come from time samples, a value clip or a spline."""
+    return bool(
+        attribute and (attribute.GetNumTimeSamples() or attribute.ValueMightBeTimeVarying())
+    )
 
 
 def _number(prim: Usd.Prim, channel: str, name: str, path: Path) -> float:
@@ -300,16 +314,15 @@ def _number(prim: Usd.Prim, channel: str, name: str, path: Path) -> float:
 
 
 def _curve(prim: Usd.Prim, name: str, times: Array, path: Path) -> Array:
-    """Degrees at the clip's frames; keys that someone thinned out are interpolated."""
+    """Degrees at the clip's frames, as USD interpolates samples or evaluates a spline."""
     attribute = prim.GetAttribute(f"{CHANNEL_PREFIX}:{name}:value")
-    query = Usd.AttributeQuery(attribute)
-    sampled = query.GetTimeSamples()
-    if not sampled:
+    if not _is_animated(attribute):
         return np.full(len(times), _number(prim, name, "value", path))
-    values = [query.Get(t) for t in sampled]
+    query = Usd.AttributeQuery(attribute)
+    values = [query.Get(t) for t in times.tolist()]
     if not all(isinstance(v, (int, float)) and abs(v) <= LARGEST for v in values):
         raise InputError(f"{path}: the curve of channel '{name}' has values that are not angles.")
-    return np.interp(times, sampled, np.array(values, dtype=np.float64))
+    return np.array(values, dtype=np.float64)
 
 
 def _skeleton_path(prim: Usd.Prim) -> str | None:

@@ -87,7 +87,7 @@ def _warps(character: Character, clip: Clip) -> dict[Side, Array]:
     found: dict[Side, Array] = {}
     for side in SIDES:
         attribute = scope.GetAttribute(f"usdhand:warp:{side}") if scope else None
-        if attribute and attribute.GetNumTimeSamples():
+        if attribute and (attribute.GetNumTimeSamples() or attribute.ValueMightBeTimeVarying()):
             found[side] = np.array([attribute.Get(t) for t in clip.time_codes.tolist()], float)
     return found
 
