@@ -32,7 +32,17 @@ class ExpandRequest(Request):
     onto: Path | None = option(
         "Put the hands on this character, whatever its rig.", default=None, metavar="CHARACTER"
     )
-    skel: str | None = shared.skel()
+    skel: str | None = shared.skel(
+        "Path or name of the skeleton where there are several (with --onto: of CHARACTER)."
+    )
+    rig_skel: str | None = option(
+        "With --onto: skeleton of the rig, where the rig file has several.",
+        default=None,
+        metavar="PRIM",
+    )
+    refresh: bool = option(
+        "Take the body from the clip that the rig was made from, as it is now.", default=False
+    )
     flatten: bool = shared.flatten()
     maps: tuple[Path, ...] = shared.maps()
     report: Path | None = shared.report()

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from usdhand.errors import UsageError
 from usdhand.formats.files import read_any
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
+from usdhand.formats.usd.rig import StoredRig
 from usdhand.motion import Clip
 from usdhand.motion.resample import resample_like
+from usdhand.problems import Problem
 from usdhand.reduce.method import expand as expand_channels
 from usdhand.report.expand import expand_result, summary
 from usdhand.requests.expand import ExpandRequest
@@ -20,20 +24,31 @@ from usdhand.verbs.outcome import Journal, Outcome
 
 
 def expand(
-    path: str | Path, conventions: Conventions | None = None, skel: str | None = None
+    path: str | Path,
+    conventions: Conventions | None = None,
+    skel: str | None = None,
+    *,
+    refresh: bool = False,
 ) -> Clip:
     """Motion of a rig file: dependent channels computed from its free ones.
 
-    ``skel`` chooses a rig by its skeleton where the file has several.
+    ``skel`` chooses a rig by its skeleton where the file has several. What has changed of the clip
+    that the rig was made from is in the ``problems`` of the result.
+
+    Parameters
+    ----------
+    refresh : take the body from that clip as it is now
 
     Raises
     ------
     InputError
         if the file cannot be read, or holds no rig, several, or one that contradicts itself.
+    UsageError
+        if ``refresh`` is wanted of a file that does not refer to the clip.
     HandNotFoundError
         if its character has no hands.
     """
-    return _expanded(usd_rig.read_stored_rig(path, skel), conventions)
+    return _expanded(usd_rig.read_stored_rig(path, skel), conventions, refresh)
 
 
 def expand_onto(
@@ -41,6 +56,8 @@ def expand_onto(
     target: Clip | str | Path,
     skel: str | None = None,
     conventions: Conventions | None = None,
+    *,
+    rig_skel: str | None = None,
 ) -> Clip:
     """Motion of a rig file's hands on another character, in the rig's time.
 
@@ -49,6 +66,8 @@ def expand_onto(
     Parameters
     ----------
     target : a clip, or a file of any format; ``skel`` chooses its skeleton
+    rig_skel : chooses a rig by its skeleton where the file has several. ``skel`` does where it is
+        the skeleton of one of them
 
     Raises
     ------
@@ -60,7 +79,8 @@ def expand_onto(
     HandNotFoundError
         if the target has no hands.
     """
-    return _expanded_onto(usd_rig.read_stored_rig(path), target, skel, conventions)
+    stored, chosen = _chosen(path, skel, rig_skel)
+    return _expanded_onto(stored, target, skel, conventions, chosen)
 
 
 def run(request: ExpandRequest, journal: Journal) -> Outcome:
@@ -69,11 +89,16 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
     conventions = load_conventions(*request.maps)
     inputs = [rig] if onto is None else [rig, onto]
     check_output(request.output, inputs, request.force, USD_SUFFIXES)
-    stored = usd_rig.read_stored_rig(rig, skel if onto is None else None)
     if onto is None:
-        motion = _expanded(stored, conventions)
+        if request.rig_skel is not None:
+            raise UsageError("--rig-skel is for --onto; without it, --skel chooses the rig.")
+        stored = usd_rig.read_stored_rig(rig, skel)
+        motion = _expanded(stored, conventions, request.refresh)
     else:
-        motion = _expanded_onto(stored, onto, skel, conventions)
+        if request.refresh:
+            raise UsageError("--refresh has no effect with --onto: leave one of them out.")
+        stored, chosen = _chosen(rig, skel, request.rig_skel)
+        motion = _expanded_onto(stored, onto, skel, conventions, chosen)
     journal.about(motion.origin.path, motion.problems, "warning")
     journal.about(motion.origin.path, misleading_names(motion, conventions), "warning")
     if not request.dry_run:
@@ -95,17 +120,55 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
     return Outcome(request, (*inputs, *request.maps), report, summary, written=written)
 
 
-def _expanded(stored: usd_rig.StoredRig, conventions: Conventions | None) -> Clip:
+def _expanded(stored: StoredRig, conventions: Conventions | None, refresh: bool) -> Clip:
     hands = usd_rig.with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
-    return expand_channels(stored.rig, stored.free, stored.clip, hands)
+    if refresh:
+        return _refreshed(stored, conventions)
+    motion = expand_channels(stored.rig, stored.free, stored.clip, hands)
+    joints = stored.clip.skeleton.joints
+    moved = {joints[j] for frames in hands.frames.values() for j in frames.links.moving}
+    changed = stored.source.change(moved) if stored.source else None
+    if changed is None:
+        return motion
+    problem = Problem("changed-source", changed)
+    return replace(motion, problems=(*motion.problems, problem))
+
+
+def _refreshed(stored: StoredRig, conventions: Conventions | None) -> Clip:
+    """The hands of a rig on the body that its own source has now."""
+    source = stored.source
+    if source is None:
+        raise UsageError(
+            f"{stored.character.path} does not refer to the clip that it was made from, so there "
+            "is nothing to refresh the body from. Give that clip: --onto CLIP"
+        )
+    body = resample_like(read_any(source.path, source.skeleton)[0], stored.clip)
+    hands = usd_rig.with_stored_frames(find_hands(body, conventions), stored.frames)
+    return expand_channels(stored.rig, stored.free, body, hands)
+
+
+def _chosen(path: str | Path, skel: str | None, rig_skel: str | None) -> tuple[StoredRig, bool]:
+    """The rig, and whether ``skel`` chose it, which may then be of no use for the target."""
+    names_one = rig_skel is None and skel is not None and usd_rig.names_a_rig(path, skel)
+    return usd_rig.read_stored_rig(path, skel if names_one else rig_skel, "--rig-skel"), names_one
 
 
 def _expanded_onto(
-    stored: usd_rig.StoredRig,
+    stored: StoredRig,
     target: Clip | str | Path,
     skel: str | None,
     conventions: Conventions | None,
+    of_rig: bool,
 ) -> Clip:
-    body = target if isinstance(target, Clip) else read_any(target, skel)[0]
+    body = target if isinstance(target, Clip) else _target(target, skel, of_rig)
     body = resample_like(body, stored.clip)
     return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
+
+
+def _target(target: str | Path, skel: str | None, of_rig: bool) -> Clip:
+    try:
+        return read_any(target, skel)[0]
+    except UsageError:
+        if not of_rig:
+            raise
+        return read_any(target)[0]

@@ -17,10 +17,12 @@ from usdhand.errors import InputError
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, VERSION, author_rig
+from usdhand.formats.usd.rig_source import RigSource, rig_source
 from usdhand.formats.usd.stage import (
     Character,
     bound_animation,
     damage_refused,
+    is_meant,
     open_stage,
 )
 from usdhand.formats.usd.write import free_child, write_motion
@@ -44,6 +46,7 @@ class StoredRig:
     free : curves of the free channels at the clip's frames, edits by others included
     clip : the rig file's own character and its (baked) motion
     frames : the anatomical frames of the skeleton it was fitted on
+    source : the file that it was made from, where it is known
     """
 
     rig: ReducedRig
@@ -51,6 +54,7 @@ class StoredRig:
     character: Character
     clip: Clip
     frames: Mapping[Side, StoredFrames]
+    source: RigSource | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +130,15 @@ def read_rig_on(stage: Usd.Stage, path: Path, skel: str | None = None) -> Reduce
         return _relations(find_rig(stage, path, skel), path)
 
 
-def read_stored_rig(path: str | Path, skel: str | None = None) -> StoredRig:
-    """Read a rig file with the curves of its free channels and its character; see `read_rig`."""
+def read_stored_rig(path: str | Path, skel: str | None = None, option: str = "--skel") -> StoredRig:
+    """Read a rig file with the curves of its free channels and its character.
+
+    Parameters and errors are those of `read_rig` and `find_rig`.
+    """
     path = Path(path)
     stage, problems = open_stage(path)
     with damage_refused(path):
-        prim = find_rig(stage, path, skel)
+        prim = find_rig(stage, path, skel, option)
         rig = _relations(prim, path)
         found = _skeleton_path(prim)
         if found is None:
@@ -142,11 +149,16 @@ def read_stored_rig(path: str | Path, skel: str | None = None) -> StoredRig:
         curves = [_curve(prim, name, clip.time_codes, path) for name in rig.free]
         values = np.stack(curves, axis=1) if curves else np.empty((len(clip), 0))
         frames = _stored_frames(prim, path)
-    return StoredRig(rig, Channels(rig.free, values), character, clip, frames)
+        source = rig_source(prim)
+    return StoredRig(rig, Channels(rig.free, values), character, clip, frames, source)
 
 
-def find_rig(stage: Usd.Stage, path: Path, skel: str | None = None) -> Usd.Prim:
+def find_rig(
+    stage: Usd.Stage, path: Path, skel: str | None = None, option: str = "--skel"
+) -> Usd.Prim:
     """The rig prim of a stage; see `read_rig`.
+
+    ``option`` chooses one on the command line, for messages.
 
     Raises
     ------
@@ -155,12 +167,7 @@ def find_rig(stage: Usd.Stage, path: Path, skel: str | None = None) -> Usd.Prim:
     """
     rigs = list(rig_prims(stage))
     if skel is not None:
-        rigs = [
-            r
-            for r in rigs
-            if skel in (_skeleton_path(r) or "").split("/")
-            or (_skeleton_path(r) or "").startswith(skel)
-        ]
+        rigs = [r for r in rigs if is_meant(Sdf.Path(_skeleton_path(r) or "/"), skel)]
     if len(rigs) == 1:
         return rigs[0]
     if not rigs:
@@ -168,8 +175,16 @@ def find_rig(stage: Usd.Stage, path: Path, skel: str | None = None) -> Usd.Prim:
         raise InputError(f"{path}: no hand rig{of} on this stage; 'usdhand reduce' writes one.")
     names = ", ".join(f"{r.GetPath()} (of {_skeleton_path(r)})" for r in rigs)
     raise InputError(
-        f"{path}: there are several hand rigs; choose one by its skeleton with --skel: {names}."
+        f"{path}: there are several hand rigs; choose one by its skeleton with {option}: {names}."
     )
+
+
+def names_a_rig(path: str | Path, skel: str) -> bool:
+    """Whether a file has several rigs, and ``skel`` chooses one of them by its skeleton."""
+    stage, _ = open_stage(Path(path))
+    skeletons = [_skeleton_path(prim) for prim in rig_prims(stage)]
+    meant = [s for s in skeletons if s and is_meant(Sdf.Path(s), skel)]
+    return len(skeletons) > 1 and len(meant) == 1
 
 
 def rig_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:

@@ -203,14 +203,18 @@ def choose_skeleton(path: Path, skeletons: list[Usd.Prim], skel: str | None) -> 
         raise UsageError(
             f"{path} holds {len(skeletons)} skeletons; choose one with --skel: {names}"
         )
-    if skel.startswith("/") and Sdf.Path.IsValidPathString(skel):
-        found = [s for s in skeletons if s.GetPath().HasPrefix(Sdf.Path(skel))]
-    else:
-        found = [s for s in skeletons if skel in str(s.GetPath()).split("/")]
+    found = [s for s in skeletons if is_meant(s.GetPath(), skel)]
     if len(found) == 1:
         return found[0]
     reason = "no skeleton" if not found else f"{len(found)} skeletons"
     raise UsageError(f"{path}: --skel {skel} matches {reason}; there are: {names}")
+
+
+def is_meant(path: Sdf.Path, skel: str) -> bool:
+    """Whether ``skel`` is this path, a path above it, or a name in it."""
+    if skel.startswith("/") and Sdf.Path.IsValidPathString(skel):
+        return bool(path.HasPrefix(Sdf.Path(skel)))
+    return skel in str(path).split("/")
 
 
 def _sentence(diagnostic: Any) -> str:
