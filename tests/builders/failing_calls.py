@@ -61,8 +61,9 @@ def cases(folder: Path) -> Iterator[Case]:
     library = built.library
     hands = usdhand.find_hands(clip)
     [reduction] = usdhand.reduce_hands([clip])
-    rig = folder / "rig.usda"
+    rig, whole = folder / "rig.usda", folder / "whole_rig.usda"
     usdhand.write_rig(reduction, rig, force=True)
+    usdhand.write_rig(reduction, whole, flatten=True, force=True)
     bare, nothing = without_fingers(body), folder / "nothing.usdc"
     text = written(folder, "text.usda", "nothing")
     no_folder = folder / "nowhere" / "out.usda"
@@ -148,6 +149,9 @@ def cases(folder: Path) -> Iterator[Case]:
         lambda: usdhand.convert(OK, OK, force=True),
     )
     yield Case("expand", no_input, "no hand rig", lambda: usdhand.expand(OK))
+    yield Case(
+        "expand", usage, "does not refer to the clip", lambda: usdhand.expand(whole, refresh=True)
+    )
     named = usdhand.load_conventions({"left": {"wrist": "Nobody"}})
     yield Case(
         "expand", no_hand, "'Nobody' is not in the skeleton", lambda: usdhand.expand(rig, named)

@@ -12,6 +12,7 @@ from usdhand.motion.rotations import Array
 from usdhand.problems import Problem
 
 FOOT = re.compile(r"foot|ankle|toe", re.IGNORECASE)
+UPRIGHT = 0.7  # of the way from feet to head: at least so much of it goes up where a body stands
 HEAD = re.compile(r"head", re.IGNORECASE)
 _LEG = re.compile(r"foot|ankle|toe|leg|knee|thigh|shin|calf", re.IGNORECASE)
 _BEYOND_A_HAND = re.compile(
@@ -127,6 +128,18 @@ def guess_up(poses: Iterable[Array], names: Iterable[str]) -> tuple[str, Problem
         "--input-up"
     )
     return up, Problem("guessed-up-axis", message, severity="note")
+
+
+def stands(places: Array, names: Sequence[str]) -> bool:
+    """Whether a body with joints at ``places`` (joints, 3) has its head above and its feet below.
+
+    By names; False for a skeleton without a head or feet by name.
+    """
+    heads, feet = ([j for j, n in enumerate(names) if p.search(n)] for p in (HEAD, FOOT))
+    if not heads or not feet:
+        return False
+    spread = float(np.linalg.norm(places[heads].mean(axis=0) - places[feet].mean(axis=0)))
+    return bool(places[heads, 1].mean() - places[feet, 1].mean() > UPRIGHT * spread)
 
 
 def bone_ways(offsets: Array, parents: NDArray[np.intp]) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdSkel
 
 from usdhand.formats.usd.bindings import binding_prim, unapplied_bindings
+from usdhand.formats.usd.curves import Tracks, type_problems
 from usdhand.motion import leaf_name
 from usdhand.problems import Problem, listed
 
@@ -27,6 +28,10 @@ def animation_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
     yield from _joint_findings(skeleton, source)
     yield from _time_findings(source)
     yield from _value_findings(source)
+    listed_joints = UsdSkel.Animation(source).GetJointsAttr().Get() or ()
+    tracks = Tracks.of(UsdSkel.Animation(source), len(listed_joints))
+    for problem in type_problems(tracks, str(source.GetPath())):
+        yield replace(problem, severity="error")
 
 
 def _binding_findings(skeleton: Usd.Prim) -> Iterator[Problem]:

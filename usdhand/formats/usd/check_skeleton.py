@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Usd, UsdGeom, UsdSkel
 
-from usdhand.formats.usd.names import illegal_names, legal_name
+from usdhand.formats.usd.names import illegal_names, legal_name, order_problems
 from usdhand.formats.usd.poses import MISPLACED_BIND_CM
 from usdhand.formats.usd.world import world_problems
 from usdhand.motion import leaf_name, parents_from_paths
@@ -40,7 +40,8 @@ def skeleton_findings(skeleton: Usd.Prim) -> Iterator[Problem]:
         yield Problem("no-joints", "the skeleton lists no joints", where, "error")
         return
     yield from _name_findings(joints, where)
-    yield from _order_findings(joints, where)
+    for problem in order_problems(joints, where):
+        yield replace(problem, severity="error")
     yield from _pose_findings(skeleton, joints, where)
     for problem in world_problems(skeleton):
         severity: Severity = "error" if problem.code == "zero-scale" else "warning"
@@ -69,19 +70,6 @@ def _name_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
             f"confuse: {listed(shared)}",
             where,
             "warning",
-        )
-
-
-def _order_findings(joints: Sequence[str], where: str) -> Iterator[Problem]:
-    parents = parents_from_paths(joints)
-    late = [joints[int(j)] for j in np.flatnonzero(parents > np.arange(len(joints)))]
-    if late:
-        yield Problem(
-            "joint-order",
-            f"{len(late)} joints are listed before their parents, so UsdSkel refuses the "
-            f"skeleton: {listed(late)}",
-            where,
-            "error",
         )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from usdhand.formats.output import check_output
@@ -13,7 +14,7 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.animation import animation_losses, author_animation
 from usdhand.formats.usd.bindings import apply_api, bind_animation
 from usdhand.formats.usd.character import character_of, gf_matrices, legal_clip
-from usdhand.formats.usd.names import author_names, legal_skeleton
+from usdhand.formats.usd.names import ALIASES, ORIGINALS, author_names, legal_skeleton
 from usdhand.formats.usd.poses import AuthoredPoses, authored_poses
 from usdhand.formats.usd.stage import Character, bound_animation, compose, find_skeletons
 from usdhand.formats.usd.world import world_above
@@ -35,7 +36,7 @@ from usdhand.motion.transforms import local_matrices
 from usdhand.problems import Problem
 
 # Problems of a clip whose animation is written again to mend them.
-MENDED = {"missing-translations", "missing-scales"}
+MENDED = {"missing-translations", "missing-scales", "wrong-type"}
 
 
 @dataclass(frozen=True)
@@ -263,6 +264,33 @@ def _mend_skeleton(prim: Usd.Prim, own: Skeleton, poses: AuthoredPoses, local: A
     if poses.bind is None:
         skeleton.CreateBindTransformsAttr(gf_matrices(own.accumulated(local)))
     apply_api(prim)
+    if (own.parents > np.arange(len(own))).any():
+        _put_in_order(prim, legal.joints, _parents_first(own))
+
+
+def _parents_first(skeleton: Skeleton) -> list[int]:
+    """Joints in their order, but for parents that come later: these go before their children."""
+    order: dict[int, None] = {}
+    for joint in range(len(skeleton)):
+        for above in reversed((joint, *skeleton.ancestors(joint))):
+            order.setdefault(above)
+    return list(order)
+
+
+def _put_in_order(prim: Usd.Prim, joints: Sequence[str], order: Sequence[int]) -> None:
+    """List the joints of a skeleton in another order, in which parents come first."""
+    for name in ("joints", "bindTransforms", "restTransforms", "jointNames", ORIGINALS, ALIASES):
+        attribute = prim.GetAttribute(name)
+        values = attribute.Get() if attribute else None
+        if values is not None and len(values) == len(order):
+            attribute.Set(type(values)([values[j] for j in order]))
+    for mesh in prim.GetStage().Traverse():  # whose indices count the joints in their old order
+        binding = UsdSkel.BindingAPI(mesh)
+        indices, own = binding.GetJointIndicesAttr(), binding.GetJointsAttr()
+        if not (indices and indices.HasAuthoredValue()) or (own and own.HasAuthoredValue()):
+            continue
+        if binding.GetInheritedSkeleton().GetPrim() == prim:
+            binding.CreateJointsAttr(Vt.TokenArray(list(joints)))
 
 
 def _rename(stage: Usd.Stage, renamed: dict[str, str]) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdSkel
+from pxr import Usd, UsdSkel, Vt
 
 from usdhand.errors import InputError
 from usdhand.formats.usd.samples import EVERY, Track, blocks, open_track
@@ -60,6 +60,23 @@ class Tracks:
         """Sample times of those that have any."""
         tracks = (self.rotations, self.translations, self.scales)
         return [track.times for track in tracks if track is not None and len(track.times)]
+
+
+def type_problems(tracks: Tracks, where: str) -> Iterator[Problem]:
+    """Tell values of other types than UsdSkel reads: it then shows the rest pose."""
+    for track, wanted, name in (
+        (tracks.rotations, Vt.QuatfArray, "quatf[]"),
+        (tracks.translations, Vt.Vec3fArray, "float3[]"),
+        (tracks.scales, Vt.Vec3hArray, "half3[]"),
+    ):
+        if track is None or isinstance(value := track.get(track.keys[0]), wanted):
+            continue
+        message = (
+            f"the values of {track.attribute.GetName()} are {type(value).__name__} instead of "
+            f"{name}, so USD shows the rest pose; they are read all the same, and 'usdhand "
+            "convert' writes them anew"
+        )
+        yield Problem("wrong-type", message, where)
 
 
 def read_curve(

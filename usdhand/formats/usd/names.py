@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
 from pxr import Sdf, Usd, Vt
 
-from usdhand.motion import Skeleton
+from usdhand.motion import Skeleton, parents_from_paths
+from usdhand.problems import Problem, listed
 
 ORIGINALS, ALIASES = "usdhand:jointNames", "usdhand:jointAliases"
 
@@ -21,16 +23,51 @@ def legal_name(name: str) -> str:
 
 def illegal_names(joints: Iterable[str]) -> list[str]:
     """Parts of joint paths that are no legal prim names, each once."""
-    names = dict.fromkeys(part for joint in joints for part in joint.split("/"))
+    paths = (joint.removeprefix("/") for joint in joints)  # absolute ones are legal
+    names = dict.fromkeys(part for path in paths for part in path.split("/"))
     return [name for name in names if not Sdf.Path.IsValidIdentifier(name)]
 
 
-def legal_skeleton(skeleton: Skeleton) -> Skeleton:
-    """Return a skeleton whose joints are legal USD paths, its own names kept as ``originals``.
+def name_problems(joints: Sequence[str], where: str) -> Iterator[Problem]:
+    """What is odd about the paths of joints and about their order."""
+    illegal = illegal_names(joints)
+    if illegal:
+        message = (
+            f"{len(illegal)} joint names are not legal in USD, e.g. '{illegal[0]}': other "
+            f"programs may lose these joints; '{legal_name(illegal[0])}' would be legal"
+        )
+        yield Problem("illegal-joint-name", message, where)
+    yield from order_problems(joints, where)
+    absolute = [joint for joint in joints if joint.startswith("/")]
+    if absolute:
+        message = (
+            f"{len(absolute)} joints have absolute paths, e.g. '{absolute[0]}': UsdSkel takes "
+            "them, other programs may not; 'usdhand convert' makes them relative"
+        )
+        yield Problem("absolute-joints", message, where)
 
-    Joints whose names become the same below one parent are told apart by a number.
+
+def order_problems(joints: Sequence[str], where: str) -> Iterator[Problem]:
+    """Tell joints that come before their parents."""
+    parents = parents_from_paths(joints)
+    late = [joints[int(j)] for j in np.flatnonzero(parents > np.arange(len(joints)))]
+    if late:
+        message = (
+            f"{len(late)} joints are listed before their parents, so UsdSkel refuses the "
+            f"skeleton: {listed(late)}. 'usdhand convert' puts them in order"
+        )
+        yield Problem("joint-order", message, where)
+
+
+def legal_skeleton(skeleton: Skeleton) -> Skeleton:
+    """Return a skeleton whose joints are legal, relative USD paths.
+
+    Joints whose names become the same below one parent are told apart by a number. Where names
+    change, the skeleton's own ones are kept as ``originals``.
     """
-    if not illegal_names(skeleton.joints) and len(set(skeleton.joints)) == len(skeleton):
+    absolute = any(joint.startswith("/") for joint in skeleton.joints)
+    legal = not illegal_names(skeleton.joints) and len(set(skeleton.joints)) == len(skeleton)
+    if legal and not absolute:
         return skeleton
     paths: dict[int, str] = {}
     taken: set[str] = set()
@@ -45,7 +82,9 @@ def legal_skeleton(skeleton: Skeleton) -> Skeleton:
         taken.add(path)
         paths[j] = path
     joints = tuple(paths[j] for j in range(len(skeleton)))
-    return replace(skeleton, joints=joints, originals=skeleton.originals or skeleton.names)
+    renamed = replace(skeleton, joints=joints)
+    kept = skeleton.originals or (() if renamed.names == skeleton.names else skeleton.names)
+    return replace(renamed, originals=kept)
 
 
 def author_names(skeleton: Usd.Prim, names: Skeleton) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import UsdSkel
 
+from usdhand.formats.guess import stands
 from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import World
 from usdhand.motion import Skeleton
@@ -65,7 +66,8 @@ def placed_skeleton(
     """Skeleton in Y-up centimetres.
 
     ``first_frame`` (joints, 4, 4), joint-to-parent and already placed in the world, stands in for
-    a bind pose that is missing, and tells in which space the bind pose was written.
+    a bind pose that is missing. It tells in which space the bind pose was written, where a body
+    would stand in both or in none.
     """
     rest = poses.neutral_locals(parents).copy()
     roots = parents < 0
@@ -78,9 +80,13 @@ def placed_skeleton(
     in_skeleton_space = world.first @ poses.bind
     in_world_space = affine(world.axes, np.zeros(3)) @ poses.bind
     # UsdSkel's documentation says world space, Blender writes skeleton space, Maya world space.
+    # A body stands at its bind pose; where that does not tell, the first frame does.
     bind = max(
         (in_skeleton_space, in_world_space),
-        key=lambda b: _agreement(_bones(b, parents), posed, parents),
+        key=lambda b: (
+            stands(b[:, :3, 3], skeleton.names),
+            _agreement(_bones(b, parents), posed, parents),
+        ),
     )
     identity = np.abs(poses.bind - np.eye(4)).max(axis=(1, 2)) < 1e-6
     return _repair_unskinned(replace(skeleton, bind=bind), first_frame, posed, identity)

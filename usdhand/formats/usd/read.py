@@ -20,8 +20,9 @@ from usdhand.formats.usd.curves import (
     frame_timing,
     joint_targets,
     read_curve,
+    type_problems,
 )
-from usdhand.formats.usd.names import illegal_names, legal_name, with_names
+from usdhand.formats.usd.names import name_problems, with_names
 from usdhand.formats.usd.poses import authored_poses, placed_skeleton
 from usdhand.formats.usd.samples import Track, steady
 from usdhand.formats.usd.stage import Character, damage_refused, find_character
@@ -110,7 +111,7 @@ def _animated_clip(character: Character) -> Clip:
     problems = (
         *character.problems,
         *unapplied_bindings(character.skeleton),
-        *_name_problems(character, joints),
+        *name_problems(joints, str(character.skeleton.GetPath())),
         *world_problems(character.skeleton, times),
         *_animation_problems(animation, joints, targets, tracks),
         *missing,
@@ -139,7 +140,7 @@ def _still_clip(character: Character) -> Clip:
     skeleton = with_names(skeleton, character.skeleton)
     problems = (
         *character.problems,
-        *_name_problems(character, joints),
+        *name_problems(joints, str(character.skeleton.GetPath())),
         *world_problems(character.skeleton),
         *missing,
         *repaired,
@@ -220,21 +221,12 @@ def _animation_problems(
     if still:
         message = f"{still} joints are not animated and keep their rest transform"
         yield Problem("fewer-joints", message, where, "note")
+    yield from type_problems(tracks, where)
     so = "so USD shows the rest pose; the rotations are read all the same"
     if tracks.translations is None:
         yield Problem("missing-translations", f"the animation has no translations, {so}", where)
     if tracks.scales is None:
         yield Problem("missing-scales", f"the animation has no scales, {so}", where)
-
-
-def _name_problems(character: Character, joints: tuple[str, ...]) -> Iterator[Problem]:
-    illegal = illegal_names(joints)
-    if illegal:
-        message = (
-            f"{len(illegal)} joint names are not legal in USD, e.g. '{illegal[0]}': other "
-            f"programs may lose these joints; '{legal_name(illegal[0])}' would be legal"
-        )
-        yield Problem("illegal-joint-name", message, str(character.skeleton.GetPath()))
 
 
 def _origin(character: Character, world: World) -> Origin:
