@@ -36,6 +36,18 @@ class InputError(UsdHandError):
     code = "input"
 
 
+class CrashedError(InputError):
+    """USD crashed while it read a file (exit 3)."""
+
+    code = "crashed"
+
+
+class UnforeseenError(UsdHandError):
+    """An error that nobody expected, in one file of several (exit 1)."""
+
+    code = "unforeseen"
+
+
 class HandNotFoundError(UsdHandError):
     """No hand was found, or two candidates claim the same place (exit 4)."""
 

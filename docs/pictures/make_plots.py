@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from usdhand.cli import main as usdhand
+from usdhand.cli.main import main as usdhand
 
 ROOT = Path(__file__).resolve().parents[2]
 TALKS, HANDS = ROOT / "samples" / "conversations", ROOT / "samples" / "hands"

@@ -8,7 +8,7 @@ from pathlib import Path
 from click.testing import CliRunner, Result
 from pxr import Usd
 
-from usdhand.cli import main
+from usdhand.cli.main import main
 
 
 def run(*arguments: object, code: int = 0) -> Result:

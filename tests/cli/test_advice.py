@@ -17,7 +17,7 @@ from conftest import REPOSITORY
 from pxr import Sdf, Usd, UsdSkel
 
 import usdhand
-from usdhand.cli import main
+from usdhand.cli.main import main
 from usdhand.motion import Clip, Skeleton, parents_from_paths
 
 SAMPLES = REPOSITORY / "samples"

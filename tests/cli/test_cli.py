@@ -416,7 +416,7 @@ def test_shelled_out_data_and_messages_are_apart(tmp_path: Path) -> None:
 
 def test_help_imports_nothing_heavy() -> None:
     code = (
-        "import sys; from usdhand.cli import main\n"
+        "import sys; from usdhand.cli.main import main\n"
         "try: main(['--help'])\n"
         "except SystemExit: pass\n"
         "print([m for m in ('numpy', 'pxr', 'scipy', 'rich', 'numba') if m in sys.modules])"

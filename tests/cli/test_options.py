@@ -10,7 +10,7 @@ from builders.cli_runner import run
 from click.testing import CliRunner
 from conftest import REPOSITORY
 
-from usdhand.cli import main
+from usdhand.cli.main import main
 from usdhand.requests.verbs import VERBS
 
 OK = REPOSITORY / "samples" / "gestures" / "ok_01.usdc"

@@ -1,5 +1,5 @@
 """The command line: one thin file a verb. The only package that imports click."""
 
-from usdhand.cli.main import main
+from usdhand.cli.entry import main
 
 __all__ = ["main"]

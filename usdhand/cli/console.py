@@ -16,7 +16,16 @@ LEAST_STEPS = 3  # with fewer, no bar is shown
 
 def say(text: str) -> None:
     """Print for people; bytes of file names that are no text as escapes."""
-    click.echo(text.encode("utf-8", "backslashreplace").decode("utf-8"))
+    click.echo(_printable(text))
+
+
+def complain(text: str) -> None:
+    """Print to stderr what went wrong."""
+    click.echo(_printable(text), err=True)
+
+
+def _printable(text: str) -> str:
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def show(problem: Problem) -> None:
@@ -24,7 +33,7 @@ def show(problem: Problem) -> None:
     text = str(problem)
     if problem.file and problem.file not in text:
         text = f"{problem.file}: {text}"
-    click.echo(f"{problem.severity.capitalize()}: {text}", err=True)
+    complain(f"{problem.severity.capitalize()}: {text}")
 
 
 class Bar:

@@ -7,6 +7,8 @@ from typing import Any
 import click
 
 from usdhand.cli.command import command_of
+from usdhand.cli.console import complain
+from usdhand.cli.interrupt import Interrupt, end_interrupted
 from usdhand.errors import UsdHandError
 from usdhand.requests.verbs import GROUPS, VERBS
 from usdhand.version import __version__
@@ -45,17 +47,18 @@ class VerbGroup(click.Group):
         try:
             return super().invoke(ctx)
         except UsdHandError as error:
-            click.echo(f"Error: {error}", err=True)
+            complain(f"Error: {error}")
             ctx.exit(error.exit_code)
         except KeyboardInterrupt:
-            click.echo("Interrupted.", err=True)
-            ctx.exit(130)
+            end_interrupted()
         except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
             raise  # click's own ways out
         except Exception as error:
+            if Interrupt.came:
+                end_interrupted()
             if ctx.find_root().params.get("debug"):
                 raise
-            click.echo(unforeseen(error), err=True)
+            complain(unforeseen(error))
             ctx.exit(1)
 
 

@@ -14,7 +14,9 @@ from usdhand.formats.suffixes import FORMATS, READABLE, USD_SUFFIXES
 from usdhand.formats.usd import read as usd
 from usdhand.formats.usd.character import legal_clip
 from usdhand.formats.usd.stage import find_character
+from usdhand.inputs import why_no_file
 from usdhand.motion import Clip
+from usdhand.motion.plausible import check_clip
 from usdhand.problems import Problem
 
 
@@ -43,8 +45,7 @@ def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFA
     path, reading = Path(path), _with_skel(reading, skel)
     if is_usd(path):
         return usd.read_clip(path, _usd_skel(path, reading))
-    clip = _reader(path).read_clip(path, reading)
-    return remembered(legal_clip(clip), animated=True)
+    return _remembered(_reader(path).read_clip(path, reading), animated=True)
 
 
 def read_character(path: str | Path, skel: str | None = None, reading: Reading = DEFAULT) -> Clip:
@@ -60,8 +61,7 @@ def read_character(path: str | Path, skel: str | None = None, reading: Reading =
     path, reading = Path(path), _with_skel(reading, skel)
     if is_usd(path):
         return usd.read_character(path, _usd_skel(path, reading))
-    clip = _reader(path).read_character(path, reading)
-    return remembered(legal_clip(clip), animated=False)
+    return _remembered(_reader(path).read_character(path, reading), animated=False)
 
 
 def read_any(
@@ -98,6 +98,7 @@ def write_other(clip: Clip, path: Path, suffix: str, up: str = "Y") -> tuple[Pro
 
     Returns what the format could not keep.
     """
+    check_clip(clip, clip.origin.path or clip.name, "the result")
     module = importlib.import_module(f"{FORMATS[suffix]}.write")
     options = {"up": up} if suffix == ".bvh" else {}
     return tuple(module.write_clip(clip, path, **options))
@@ -113,10 +114,8 @@ def is_usd(path: Path) -> bool:
     """
     suffix = path.suffix.lower()
     if suffix not in READABLE:
-        if not path.exists():
-            raise InputError(f"{path}: no such file.")
-        if path.is_dir():
-            raise InputError(f"{path} is a folder, not a file.")
+        if why := why_no_file(path):
+            raise InputError(f"{path}: {why}.")
         raise InputError(
             f"{path}: '{path.suffix}' files are not read; expected one of {', '.join(READABLE)}."
         )
@@ -124,11 +123,15 @@ def is_usd(path: Path) -> bool:
 
 
 def _reader(path: Path) -> Any:
-    if not path.exists():
-        raise InputError(f"{path}: no such file.")
-    if path.is_dir():
-        raise InputError(f"{path} is a folder, not a file.")
+    if why := why_no_file(path):
+        raise InputError(f"{path}: {why}.")
     return importlib.import_module(f"{FORMATS[path.suffix.lower()]}.read")
+
+
+def _remembered(clip: Clip, *, animated: bool) -> Clip:
+    clip = legal_clip(replace(clip, name=clip.name.encode("utf-8", "backslashreplace").decode()))
+    check_clip(clip, clip.origin.path or clip.name)
+    return remembered(clip, animated=animated)
 
 
 def _with_skel(reading: Reading, skel: str | None) -> Reading:

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import os
-import signal
-import sys
 import tempfile
-import threading
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from usdhand.errors import OutputError
@@ -45,6 +41,8 @@ def check_outputs(
             raise OutputError(f"{output} is an input of this command; inputs are never changed.")
         if output.is_dir():
             raise OutputError(f"{output} is a folder; give a file.")
+        if identity is not None and not output.is_file():
+            raise OutputError(f"{output} is a pipe or a device; give a file.")
         if identity is not None and not force:
             raise OutputError(f"{output} exists; use --force to replace it.")
     for folder, output in {o.absolute().parent: o for o in reversed(outputs)}.items():
@@ -97,37 +95,3 @@ def _check_writable(folder: Path) -> None:
             pass
     except OSError as error:
         raise OutputError(f"{folder}: cannot write there ({error.strerror}).") from error
-
-
-@contextmanager
-def written_beside(output: Path) -> Iterator[Path]:
-    """A path in the output's folder that replaces it once the block has ended without an error.
-
-    It is cleaned up also when the program is told to end.
-    """
-    temporary = output.with_name(f".{output.stem}.{os.getpid()}.tmp{output.suffix}")
-    try:
-        with _ended_by_exception():
-            yield temporary
-        os.replace(temporary, output)  # noqa: PTH105  (atomic on every system)
-    except OSError as error:
-        raise OutputError(f"{output}: cannot be written ({error.strerror or error}).") from error
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-@contextmanager
-def _ended_by_exception() -> Iterator[None]:
-    """Turn SIGTERM into an exception, so that what was begun is cleaned up."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def end(number: int, _: object) -> None:
-        sys.exit(128 + number)
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)

@@ -116,6 +116,7 @@ class ConvertRequest(Request):
     reading: Reading = settings(Reading())
     onto_skel: str | None = shared.skel("Skeleton of the character to put fingers on.")
     maps: tuple[Path, ...] = shared.maps()
+    allow_outside: bool = shared.allow_outside()
     report: Path | None = shared.report()
     dry_run: bool = shared.dry_run()
     force: bool = shared.force()

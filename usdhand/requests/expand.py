@@ -44,6 +44,7 @@ class ExpandRequest(Request):
         "Take the body from the clip that the rig was made from, as it is now.", default=False
     )
     flatten: bool = shared.flatten()
+    allow_outside: bool = shared.allow_outside()
     maps: tuple[Path, ...] = shared.maps()
     report: Path | None = shared.report()
     dry_run: bool = shared.dry_run()

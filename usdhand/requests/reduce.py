@@ -41,6 +41,7 @@ class ReduceRequest(Request):
     )
     side: shared.Sides = shared.side()
     flatten: bool = shared.flatten()
+    allow_outside: bool = shared.allow_outside()
     skel: str | None = shared.skel()
     maps: tuple[Path, ...] = shared.maps()
     report: Path | None = shared.report()

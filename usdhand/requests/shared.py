@@ -32,6 +32,11 @@ def flatten() -> Any:
     return option("Write one file instead of a layer over the input.", default=False)
 
 
+def allow_outside() -> Any:
+    """``--allow-outside``: what a package may take in."""
+    return option("Pack files from outside the input's folder into a .usdz, too.", default=False)
+
+
 def skel(
     help: str = "Path or name of the skeleton where there are several.",  # noqa: A002
 ) -> Any:

@@ -48,6 +48,7 @@ class SpliceRequest(Request):
     settings: SpliceSettings = settings(SpliceSettings())
     side: shared.Sides = shared.side()
     flatten: bool = shared.flatten()
+    allow_outside: bool = shared.allow_outside()
     skel: str | None = shared.skel()
     hands_skel: str | None = shared.skel("Skeleton of the hand clip where there are several.")
     maps: tuple[Path, ...] = shared.maps()

@@ -29,6 +29,7 @@ def with_explicit(
         if side in tables:
             named = {role: _lookup(rig, side, role, j) for role, j in tables[side].items()}
             hands[side] = _amended(hands.get(side), side, named)
+            _check_once(rig, side, named)
             _check_named(rig, hands[side])
     _check_apart(rig, hands)
     body: dict[str, Any] = {
@@ -36,6 +37,16 @@ def with_explicit(
     }
     notes = (*found.notes, "joints taken from the map file")
     return replace(found, hands=hands, notes=notes, **body)
+
+
+def _check_once(rig: NamedJoints, side: Side, named: Mapping[str, int]) -> None:
+    """Refuse a joint that is said to be two of the same hand."""
+    seen: dict[int, str] = {}
+    for role, joint in named.items():
+        if (other := seen.setdefault(joint, role)) != role:
+            raise HandNotFoundError(
+                f"map file, [{side}]: '{rig.path(joint)}' is named for both {other} and {role}"
+            )
 
 
 def _check_named(rig: NamedJoints, hand: HandMap) -> None:

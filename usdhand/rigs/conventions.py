@@ -23,6 +23,7 @@ from usdhand.anatomy.hand import (
 )
 from usdhand.display import displayed
 from usdhand.errors import UsageError
+from usdhand.inputs import read_text
 
 Table = dict[str, Any]
 Names = tuple[str, ...]
@@ -38,6 +39,9 @@ HAND_ROLES: tuple[str, ...] = (
     *TIPS.values(),
     THUMB_CARPAL,
 )
+
+MOST_BYTES = 1_000_000  # of a map file
+MOST_DOTS = 100  # in a line of one
 
 _SETTINGS = ("about", "like", "side", "digit", "prefix")
 _SHORTHANDS = ("thumb", "thumb_tip", "thumb_carpal", "finger", "metacarpal", "tip")
@@ -177,13 +181,25 @@ def _packaged() -> Conventions:
 
 def _read(path: str | Path) -> Table:
     try:
-        return tomllib.loads(Path(path).read_text("utf-8"))
+        return tomllib.loads(_checked_text(read_text(Path(path), MOST_BYTES)))
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, _TooLongError) as error:
         raise UsageError(f"{path}: is not valid TOML: {error}") from error
     except RecursionError as error:
         raise UsageError(f"{path}: its values are nested too deeply") from error
+
+
+class _TooLongError(Exception):
+    """What no map file has and the parser would need gigabytes for."""
+
+
+def _checked_text(text: str) -> str:
+    """Refuse dotted keys of many parts, whose memory grows with the square of their length."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.count(".") > MOST_DOTS and not line.lstrip().startswith("#"):
+            raise _TooLongError(f"more than {MOST_DOTS} dots in line {number}")
+    return text
 
 
 def _explicit(table: Mapping[str, Any], name: str, where: str) -> dict[str, str]:
@@ -247,6 +263,8 @@ def _convention(
 ) -> Convention:
     table = _inherit(name, tables, where)
     spelled = dict(_spelled_out(table))
+    if own:
+        _check_apart(spelled, f"{where}: [{name}]")
     spellings: list[tuple[Side | None, str]] = [(None, "")]
     if "side" in table:
         spellings = list(zip(SIDES, table["side"], strict=True))
@@ -258,6 +276,15 @@ def _convention(
         }
     body = {role: _names(table[role]) for role in BODY_JOINTS if role in table}
     return Convention(name, hands, body, _names(table.get("prefix", [])), own)
+
+
+def _check_apart(spelled: Mapping[str, Names], where: str) -> None:
+    """Refuse a name that is said to be of two joints of a hand."""
+    seen: dict[str, str] = {}
+    for role, names in spelled.items():
+        for name in names:
+            if (other := seen.setdefault(name, role)) != role:
+                raise UsageError(f"{where}: '{name}' is given for both {other} and {role}")
 
 
 def _spelled_out(table: Table) -> Iterator[tuple[str, Names]]:

@@ -68,6 +68,7 @@ def write_clip(
     output: str | Path,
     *,
     flatten: bool = False,
+    allow_outside: bool = False,
     force: bool = False,
     conventions: Conventions | None = None,
     inputs: Sequence[str | Path] = (),
@@ -91,5 +92,12 @@ def write_clip(
     changed = [j for f in find_hands(clip, conventions).frames.values() for j in f.links.moving]
     character = character_under(clip)
     return write_motion(
-        character, clip, changed, output, flatten=flatten, force=force, inputs=inputs
+        character,
+        clip,
+        changed,
+        output,
+        flatten=flatten,
+        allow_outside=allow_outside,
+        force=force,
+        inputs=inputs,
     )

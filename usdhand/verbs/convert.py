@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -13,6 +14,7 @@ import numpy as np
 from usdhand.anatomy import SIDES
 from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError, UsageError, UsdHandError
+from usdhand.formats.atomic import written_beside
 from usdhand.formats.files import (
     animation_names,
     is_usd,
@@ -25,7 +27,6 @@ from usdhand.formats.output import (
     check_output,
     check_outputs,
     make_folder,
-    written_beside,
 )
 from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.formats.sources import character_under
@@ -48,6 +49,7 @@ from usdhand.rigs import Conventions, load_conventions, map_character
 from usdhand.verbs.clips import find_hands, misleading_names
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
+from usdhand.workers import each_apart
 
 MOST_FRAMES = 10_000_000
 
@@ -86,6 +88,7 @@ def convert(
     onto: str | Path | None = None,
     onto_reading: Reading = DEFAULT,
     conventions: Conventions | None = None,
+    allow_outside: bool = False,
     force: bool = False,
     dry_run: bool = False,
 ) -> Converted:
@@ -94,6 +97,7 @@ def convert(
     Parameters
     ----------
     onto : a character that gets the fingers of ``path``, and is written instead of it
+    allow_outside : pack files from outside the input's folder into a .usdz, too
 
     Raises
     ------
@@ -130,7 +134,15 @@ def convert(
         edited = edits.of_frames or fingers is not None
         if not dry_run:
             character = placed(character_under(body), placement)
-            lost += write_placed(character, clip, output, edited=edited, force=force, inputs=inputs)
+            lost += write_placed(
+                character,
+                clip,
+                output,
+                edited=edited,
+                allow_outside=allow_outside,
+                force=force,
+                inputs=inputs,
+            )
     else:
         clip = scaled(counted_in_frames(motion(body)), edits.scale)
         if edits.start is not None:
@@ -282,6 +294,18 @@ class _Job:
     reading: Reading
     target: Path
 
+    def __str__(self) -> str:
+        return str(self.path)
+
+
+@dataclass(frozen=True)
+class _Done:
+    """What came of it: the report's part, what is odd about the file, and what is lost."""
+
+    result: dict[str, Any]
+    odd: tuple[Problem, ...]
+    lost: tuple[Problem, ...]
+
 
 def run(request: ConvertRequest, journal: Journal) -> Outcome:
     """Convert every file, or every animation of one; of several, bad ones are left out."""
@@ -292,24 +316,20 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
     jobs, code = _jobs(paths, request, journal)
     results: list[dict[str, Any]] = []
     written: list[Path] = []
-    for job in journal.each(jobs, "converting"):
+    each = partial(_converted, request=request, conventions=conventions)
+    for job, done in journal.each(each_apart(each, jobs), "converting", len(jobs)):
         result: dict[str, Any] = {"path": str(job.path), "output": None}
         results.append(result)
-        try:
-            done = _converted(job, request, conventions)
-        except UsdHandError as error:
+        if isinstance(done, UsdHandError):
             if len(jobs) == 1:
-                raise
-            journal.fail(error)
-            code = max(code, error.exit_code)
-            result |= {"error": str(error)}
+                raise done
+            journal.fail(done)
+            code = max(code, done.exit_code)
+            result |= {"error": str(done)}
             continue
-        result |= convert_result(done.source, done.clip, done.animated, done.lost, conventions)
-        journal.about(job.path, done.source.problems, "warning")
+        result |= done.result
+        journal.about(job.path, done.odd, "warning")
         journal.about(job.target, done.lost, "warning")
-        if request.onto is not None:
-            for clip in (done.source, done.clip):
-                journal.about(job.path, misleading_names(clip, conventions), "warning")
         if not request.dry_run:
             result["output"] = str(job.target)
             written.append(job.target)
@@ -324,8 +344,8 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
     )
 
 
-def _converted(job: _Job, request: ConvertRequest, conventions: Conventions | None) -> Converted:
-    return convert(
+def _converted(job: _Job, request: ConvertRequest, conventions: Conventions | None) -> _Done:
+    done = convert(
         job.path,
         job.target,
         request.edits,
@@ -333,9 +353,14 @@ def _converted(job: _Job, request: ConvertRequest, conventions: Conventions | No
         onto=request.onto,
         onto_reading=Reading(skel=request.onto_skel),
         conventions=conventions,
+        allow_outside=request.allow_outside,
         force=request.force,
         dry_run=request.dry_run,
     )
+    result = convert_result(done.source, done.clip, done.animated, done.lost, conventions)
+    clips = (done.source, done.clip) if request.onto is not None else ()
+    misled = (problem for clip in clips for problem in misleading_names(clip, conventions))
+    return _Done(result, (*done.source.problems, *misled), done.lost)
 
 
 def _jobs(
@@ -355,9 +380,12 @@ def _jobs(
     check_folder(folder)
     jobs: list[_Job] = []
     code = 0
+    stems = Counter(path.stem for path in paths)
     for path in paths:
         try:
-            each = _each(path, request.reading)
+            # Files of one name in several formats keep their suffixes, to be told apart.
+            stem = path.stem if stems[path.stem] == 1 else path.name
+            each = _each(path, stem, request.reading)
         except UsdHandError as error:
             journal.fail(error)
             code = max(code, error.exit_code)
@@ -372,12 +400,12 @@ def _jobs(
     return jobs, code
 
 
-def _each(path: Path, reading: Reading) -> list[tuple[str, Reading]]:
+def _each(path: Path, stem: str, reading: Reading) -> list[tuple[str, Reading]]:
     """A name and a reading for every animation of a file."""
     names = () if reading.animation is not None else animation_names(path)
     if len(names) < 2:
-        return [(path.stem, reading)]
-    return [(f"{path.stem}.{_file_part(name)}", replace(reading, animation=name)) for name in names]
+        return [(stem, reading)]
+    return [(f"{stem}.{_file_part(name)}", replace(reading, animation=name)) for name in names]
 
 
 def _file_part(name: str) -> str:

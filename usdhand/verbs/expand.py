@@ -106,6 +106,7 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
             motion,
             request.output,
             flatten=request.flatten,
+            allow_outside=request.allow_outside,
             force=request.force,
             conventions=conventions,
             inputs=inputs,

@@ -39,13 +39,15 @@ def find_files_below(arguments: Iterable[str]) -> list[Path]:
     found: dict[Path, Path] = {}
     for argument in arguments:
         folder = Path(argument)
-        paths = _below(folder) if folder.is_dir() else find_files([argument])
+        paths = _below(folder) if argument and folder.is_dir() else find_files([argument])
         for path in paths:
             found.setdefault(path.absolute(), path)
     return list(found.values())
 
 
 def _named(argument: str, suffixes: Sequence[str]) -> list[Path]:
+    if not argument:
+        raise UsageError("A file name is empty.")
     path = Path(argument)
     if path.is_dir():
         inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)

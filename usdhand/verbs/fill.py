@@ -100,6 +100,7 @@ def write_filled(
     output: str | Path,
     *,
     flatten: bool = False,
+    allow_outside: bool = False,
     force: bool = False,
     inputs: Sequence[str | Path] = (),
 ) -> tuple[Problem, ...]:
@@ -128,6 +129,7 @@ def write_filled(
         filled.changed,
         Path(output),
         flatten=flatten,
+        allow_outside=allow_outside,
         force=force,
         inputs=inputs,
         variants=variants if len(variants) > 1 else None,
@@ -162,7 +164,12 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
     journal.tell(*fill_problems(filled, library, request.settings, str(request.body)))
     if not request.dry_run:
         lost = write_filled(
-            filled, output, flatten=request.flatten, force=request.force, inputs=given[1:]
+            filled,
+            output,
+            flatten=request.flatten,
+            allow_outside=request.allow_outside,
+            force=request.force,
+            inputs=given[1:],
         )
         journal.about(output, lost, "warning", "note")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from usdhand.rigs import Conventions, load_conventions
 from usdhand.verbs.clips import find_hands
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
+from usdhand.workers import each_apart
 
 
 def run(request: InspectRequest, journal: Journal) -> Outcome:
@@ -21,12 +23,12 @@ def run(request: InspectRequest, journal: Journal) -> Outcome:
     conventions = load_conventions(*request.maps)
     results: list[dict[str, Any]] = []
     code = 0
-    for path in journal.each(paths, "inspecting"):
-        try:
-            found = _inspect(path, request.skel, conventions)
-        except UsdHandError as error:
-            journal.fail(error)
-            found, code = {"error": str(error)}, max(code, error.exit_code)
+    each = partial(_inspect, skel=request.skel, conventions=conventions)
+    for path, found in journal.each(each_apart(each, paths), "inspecting", len(paths)):
+        if isinstance(found, UsdHandError):
+            journal.fail(found)
+            code = max(code, found.exit_code)
+            found = {"error": str(found)}
         if "hand_error" in found:
             journal.fail(HandNotFoundError(found["hand_error"]))
             code = max(code, HandNotFoundError.exit_code)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import re
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -22,6 +21,7 @@ from usdhand.problems import Problem
 from usdhand.progress import Progress, each
 from usdhand.rigs import Conventions
 from usdhand.verbs.clips import find_hands
+from usdhand.workers import each_apart
 
 
 @displayed(
@@ -61,6 +61,9 @@ class _Task:
     segmentation: Segmentation
     conventions: Conventions | None
 
+    def __str__(self) -> str:
+        return str(self.path)
+
 
 def build_library(
     paths: Sequence[str | Path],
@@ -71,7 +74,7 @@ def build_library(
     previous: MotionLibrary | None = None,
     rebuild: bool = False,
     conventions: Conventions | None = None,
-    jobs: int = 1,
+    jobs: int = 0,
     progress: Progress | None = None,
     keep: float = 10.0,
 ) -> BuildResult:
@@ -85,7 +88,7 @@ def build_library(
     previous : clips whose content has not changed are taken over from it; labels that someone
         edited, and actors, of the others too, as long as file or content is the same
     rebuild : keep only labels and actors
-    jobs : processes
+    jobs : processes that read, so that a file that crashes USD is left out; 0 to read in this one
     keep : seconds after which what was read is saved beside the output, so that a build that was
         interrupted continues there
     progress : gets how many clips are read and how many there are; False stops, and what was read
@@ -256,19 +259,19 @@ def label_of(stem: str) -> str:
     return found.group(1) if found else ""
 
 
-def _run(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Problem]:
-    if jobs <= 1 or len(tasks) < 2:
-        return map(_read, tasks)
-    return _in_processes(tasks, jobs)
+def _run(tasks: Sequence[_Task], jobs: int) -> Iterator[LibraryClip | Problem]:
+    if jobs < 1:
+        yield from map(_read, tasks)
+        return
+    with closing(each_apart(_read, tasks, jobs)) as results:
+        for task, found in results:
+            yield _left_out(task, found) if isinstance(found, UsdHandError) else found
 
 
-def _in_processes(tasks: Sequence[_Task], jobs: int) -> Iterable[LibraryClip | Problem]:
-    # Not forked: USD has threads, and a copy of a process with threads may hang.
-    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"))
-    try:
-        yield from pool.map(_read, tasks, chunksize=max(1, min(16, len(tasks) // (8 * jobs))))
-    finally:
-        pool.shutdown(cancel_futures=True)
+def _left_out(task: _Task, error: UsdHandError) -> Problem:
+    # The reason stands beside the path, which need not be in it again.
+    reason = str(error).removeprefix(f"{task.path}: ")
+    return Problem("left-out", reason, file=task.relative)
 
 
 def _read(task: _Task) -> LibraryClip | Problem:
@@ -289,13 +292,9 @@ def _read(task: _Task) -> LibraryClip | Problem:
             return Problem("left-out", "its fingers do not move", file=task.relative)
         return replace(made, name=task.name)
     except UsdHandError as error:
-        # The reason stands beside the path, which need not be in it again.
-        reason = str(error).removeprefix(f"{task.path}: ")
-        return Problem(
-            "left-out",
-            "it is a motion library" if is_library(task.path) else reason,
-            file=task.relative,
-        )
+        if is_library(task.path):
+            return Problem("left-out", "it is a motion library", file=task.relative)
+        return _left_out(task, error)
 
 
 def _cut_again(clip: LibraryClip, segmentation: Segmentation) -> LibraryClip:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import signal
 import threading
 from collections.abc import Iterator, Sequence
@@ -21,6 +22,7 @@ from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.fill.settings import Segmentation
 from usdhand.formats.output import check_output
 from usdhand.formats.usd.library import is_library, read_library, write_library
+from usdhand.inputs import read_text
 from usdhand.problems import counted, listed
 from usdhand.report.library import library_result, summary
 from usdhand.requests.library import LibraryBuildRequest
@@ -175,12 +177,14 @@ def _segmentation(request: LibraryBuildRequest, previous: MotionLibrary | None) 
 
 def _read_labels(path: Path) -> dict[str, tuple[str, str]]:
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with io.StringIO(read_text(path).removeprefix("\ufeff"), newline="") as file:
             head = file.readline()
             file.seek(0)
             reader = csv.DictReader(file, delimiter=max(",;\t", key=head.count))
             rows, columns = list(reader), set(reader.fieldnames or ())
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
+    except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV ({error}).") from error
     if not {"file", "label"} <= columns:
         raise InputError(f"{path}: needs a header with the columns file and label.")

@@ -10,9 +10,10 @@ from typing import Any
 from usdhand.anatomy import Side
 from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.formats.atomic import written_beside
 from usdhand.formats.files import is_usd, read_any
 from usdhand.formats.hashing import file_hash
-from usdhand.formats.output import check_output, written_beside
+from usdhand.formats.output import check_output
 from usdhand.formats.usd.shown import ShownMotion, read_shown
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
@@ -124,7 +125,7 @@ def write_preview(
     output = Path(output)
     check_output(output, inputs, force, PAGE_SUFFIXES)
     with written_beside(output) as temporary:
-        temporary.write_text(previewed.html, encoding="utf-8")
+        temporary.write_text(previewed.html, encoding="utf-8", errors="backslashreplace")
 
 
 def _lanes(

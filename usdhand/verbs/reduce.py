@@ -90,7 +90,12 @@ def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
 
 
 def write_rig(
-    reduction: Reduction, output: str | Path, *, flatten: bool = False, force: bool = False
+    reduction: Reduction,
+    output: str | Path,
+    *,
+    flatten: bool = False,
+    allow_outside: bool = False,
+    force: bool = False,
 ) -> tuple[Problem, ...]:
     """Write a reduced clip as a rig over the file it was read from.
 
@@ -106,7 +111,14 @@ def write_rig(
         if the output is refused or cannot be written; nothing is left behind then.
     """
     character = character_under(reduction.clip, animated=True)
-    return usd_rig.write_rig(reduction, character, Path(output), flatten=flatten, force=force)
+    return usd_rig.write_rig(
+        reduction,
+        character,
+        Path(output),
+        flatten=flatten,
+        allow_outside=allow_outside,
+        force=force,
+    )
 
 
 def _characters(clips: Sequence[Clip]) -> list[list[Clip]]:
@@ -154,7 +166,13 @@ def run(request: ReduceRequest, journal: Journal) -> Outcome:
         make_folder(outputs[0].parent)
         pairs = list(zip(reductions, outputs, strict=True))
         for reduction, target in journal.each(pairs, "writing"):
-            lost = write_rig(reduction, target, flatten=request.flatten, force=request.force)
+            lost = write_rig(
+                reduction,
+                target,
+                flatten=request.flatten,
+                allow_outside=request.allow_outside,
+                force=request.force,
+            )
             journal.about(target, lost, "warning", "note")
 
     def report() -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.hashing import file_hash
+from usdhand.inputs import read_json
 from usdhand.problems import Problem, listed
 from usdhand.requests.base import Request
 from usdhand.requests.codec import from_data
@@ -38,10 +38,10 @@ def run(request: RerunRequest, journal: Journal) -> Outcome:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        report: Any = json.loads(path.read_text("utf-8"))
+        report: Any = read_json(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise InputError(f"{path}: this is not a JSON report of usdhand.") from error
     if not _is_report(report):
         raise InputError(

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from usdhand.formats.output import check_output, written_beside
+from usdhand.formats.atomic import written_beside
+from usdhand.formats.output import check_output
 from usdhand.problems import Problem
 from usdhand.report.plots.style import write_plots
 from usdhand.requests.base import Request

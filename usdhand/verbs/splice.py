@@ -122,6 +122,7 @@ def write_spliced(
     output: str | Path,
     *,
     flatten: bool = False,
+    allow_outside: bool = False,
     force: bool = False,
     conventions: Conventions | None = None,
     inputs: Sequence[str | Path] = (),
@@ -152,6 +153,7 @@ def write_spliced(
         changed,
         Path(output),
         flatten=flatten,
+        allow_outside=allow_outside,
         force=force,
         inputs=inputs,
         author=author_warps(
@@ -192,6 +194,7 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
             spliced,
             output,
             flatten=request.flatten,
+            allow_outside=request.allow_outside,
             force=request.force,
             conventions=conventions,
             inputs=[hands],

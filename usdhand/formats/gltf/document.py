@@ -7,7 +7,7 @@ import binascii
 import json
 import math
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 from urllib.parse import unquote, unquote_to_bytes
 
 from usdhand.errors import InputError
+from usdhand.inputs import why_no_file
 from usdhand.problems import CHOICES, listed
 
 MAGIC = b"glTF"
@@ -175,14 +176,16 @@ class Document:
         return data
 
     def _beside(self, buffer: Element, uri: str, size: int) -> bytes:
-        if ":" in uri.split("/")[0] or uri.startswith(("/", "\\")):
-            buffer.refuse(f"names {_quoted(uri)}, which is not a file beside it")
-        path = self.path.parent / unquote(uri)
+        name = unquote(uri)
+        parts = name.replace("\\", "/").split("/")
+        if ":" in parts[0] or not parts[0] or _leaves(parts):
+            buffer.refuse(f"names {_quoted(uri)}, which is not a file beside it or below")
+        path = self.path.parent / name
         try:
-            if not path.is_file():
-                raise InputError(f"{self.path}: its buffer file {path} is missing.")
+            if why := why_no_file(path):
+                raise InputError(f"{self.path}: its buffer file {path} is missing ({why}).")
             with path.open("rb") as file:
-                return file.read(size)
+                return file.read(min(size, path.stat().st_size))
         except (OSError, ValueError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or "no such name"
             raise InputError(
@@ -261,6 +264,16 @@ def _parsed(path: Path, data: bytes, start: int) -> Any:
     if not isinstance(value, dict):
         raise InputError(f"{path}: is not glTF: its JSON is not an object.")
     return value
+
+
+def _leaves(parts: Sequence[str]) -> bool:
+    """Whether the parts of a relative path lead out of the folder where it starts."""
+    depth = 0
+    for part in parts:
+        depth += -1 if part == ".." else part not in ("", ".")
+        if depth < 0:
+            return True
+    return False
 
 
 def _data_uri(buffer: Element, uri: str) -> bytes:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, UsdSkel, Vt
 
+from usdhand.errors import InputError
 from usdhand.formats.usd.add_joints import joint_tokens
 from usdhand.formats.usd.curves import Tracks, frame_timing, joint_targets
 from usdhand.formats.usd.poses import authored_poses
@@ -131,6 +132,10 @@ def author_animation(
             continue
         spec = attribute.path
         for time, row in zip(times.tolist(), rows, strict=True):
+            if not np.isfinite(row).all():
+                raise InputError(
+                    f"{character.path}: {name} at time code {time:g} are too large for USD."
+                )
             layer.SetTimeSample(spec, time, convert(row))
     return times
 

@@ -10,14 +10,9 @@ from pxr import Sdf, Usd, UsdGeom, UsdValidation
 
 from usdhand.formats.usd.check_animation import animation_findings
 from usdhand.formats.usd.check_skeleton import skeleton_findings
+from usdhand.formats.usd.damage import refuses_damage
 from usdhand.formats.usd.rig import rig_findings
-from usdhand.formats.usd.stage import (
-    choose_skeleton,
-    damage_refused,
-    find_skeletons,
-    open_stage,
-    usd_diagnostics,
-)
+from usdhand.formats.usd.stage import choose_skeleton, find_skeletons, open_stage
 from usdhand.problems import Problem, Severity
 
 __all__ = ["Problem", "Severity", "check_file"]
@@ -26,6 +21,7 @@ __all__ = ["Problem", "Severity", "check_file"]
 ONLY_WARNINGS = {"MissingMetersPerUnitMetadata", "MissingUpAxisMetadata"}
 
 
+@refuses_damage
 def check_file(path: str | Path, skel: str | None = None) -> tuple[Problem, ...]:
     """Check everything about a file that matters to the motion of its characters.
 
@@ -48,8 +44,7 @@ def check_file(path: str | Path, skel: str | None = None) -> tuple[Problem, ...]
     """
     path = Path(path)
     stage, _ = open_stage(path)
-    with usd_diagnostics(), damage_refused(path):
-        found = dict.fromkeys(_stage_findings(path, stage, skel))
+    found = dict.fromkeys(_stage_findings(path, stage, skel))
     return tuple(sorted(found, key=lambda finding: finding.severity != "error"))
 
 

@@ -14,6 +14,7 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.animation import animation_losses, author_animation
 from usdhand.formats.usd.bindings import apply_api, bind_animation
 from usdhand.formats.usd.character import character_of, gf_matrices, legal_clip
+from usdhand.formats.usd.damage import refuses_damage
 from usdhand.formats.usd.names import ALIASES, ORIGINALS, author_names, legal_skeleton
 from usdhand.formats.usd.poses import AuthoredPoses, authored_poses
 from usdhand.formats.usd.stage import Character, bound_animation, compose, find_skeletons
@@ -30,6 +31,7 @@ from usdhand.formats.usd.write import (
     within_samples,
 )
 from usdhand.motion import Clip, Skeleton
+from usdhand.motion.plausible import check_clip
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import recounted_code
 from usdhand.motion.transforms import local_matrices
@@ -57,6 +59,7 @@ class StageEdit:
     up: str | None = None
 
 
+@refuses_damage
 def placed(character: Character, placement: StageEdit) -> Character:
     """Return a character on a stage in memory that shows its own stage with another placement.
 
@@ -79,12 +82,14 @@ def placed(character: Character, placement: StageEdit) -> Character:
     return replace(character, stage=stage, skeleton=skeleton, animation=bound_animation(skeleton))
 
 
+@refuses_damage
 def write_placed(
     character: Character,
     clip: Clip,
     output: Path,
     *,
     edited: bool,
+    allow_outside: bool = False,
     force: bool = False,
     inputs: Sequence[Path] = (),
 ) -> tuple[Problem, ...]:
@@ -105,6 +110,7 @@ def write_placed(
         if the output is refused or cannot be written; nothing is left behind then.
     """
     check_name(output)
+    check_clip(clip, character.path, "the result")
     check_output(
         output, [character.path, *stage_files(character.stage), *inputs], force, USD_SUFFIXES
     )
@@ -130,7 +136,7 @@ def write_placed(
     local = _local_in_file(character, clip)
     stage.GetRootLayer().TransferContent(layer)
     _mend_skeleton(stage.GetPrimAtPath(character.skeleton.GetPath()), clip.skeleton, poses, local)
-    return (*lost, *save_flat(stage, output))
+    return (*lost, *save_flat(stage, output, allow_outside=allow_outside))
 
 
 def write_made(
@@ -140,6 +146,7 @@ def write_made(
 
     Returns what USD said of the package, if it is one. Raises OutputError if it cannot be written.
     """
+    check_clip(clip, clip.origin.path or clip.name, "the result")
     stage = character_of(legal_clip(clip), up=up, animated=animated).stage
     if output.suffix.lower() == ".usdz":
         return save_flat(stage, output)

@@ -9,7 +9,8 @@ from typing import Any
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
-from usdhand.formats.usd.stage import compose, usd_diagnostics
+from usdhand.formats.usd.damage import usd_diagnostics
+from usdhand.formats.usd.stage import compose
 from usdhand.problems import Problem
 
 EMBEDDED = "usdhand:embedded"  # in the custom data of a class: the file that it is a copy of

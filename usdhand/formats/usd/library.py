@@ -31,7 +31,8 @@ from usdhand.fill.settings import Segmentation
 from usdhand.formats import paths
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.formats.usd.stage import Character, compose, open_stage, usd_diagnostics
+from usdhand.formats.usd.damage import damage_refused, refuses_damage, usd_diagnostics
+from usdhand.formats.usd.stage import Character, compose, open_stage
 from usdhand.formats.usd.write import save_layer
 from usdhand.motion import Clip
 from usdhand.problems import Problem
@@ -89,7 +90,8 @@ def is_library(file: Path | Clip) -> bool:
     if isinstance(file, Clip):
         return isinstance(file.source, Character) and _holds_library(file.source.stage)
     try:
-        return _holds_library(_open(file))
+        with damage_refused(file):
+            return _holds_library(_open(file))
     except UsdHandError:
         return False
 
@@ -99,6 +101,7 @@ def _holds_library(stage: Usd.Stage) -> bool:
     return bool(root) and root.GetAttribute("usdhand:libraryVersion").HasValue()
 
 
+@refuses_damage
 def read_library(path: str | Path) -> MotionLibrary:
     """Read a library, clips in order of their names.
 
@@ -129,8 +132,9 @@ def read_library(path: str | Path) -> MotionLibrary:
     parent = stage.GetPrimAtPath(CLIPS)
     for prim in parent.GetChildren() if parent else ():
         try:
-            clips.append(_read_clip(prim))
-        except _DamagedError as error:
+            with damage_refused(path):
+                clips.append(_read_clip(prim))
+        except (_DamagedError, InputError) as error:
             damaged.append(Problem("damaged", str(error), file=str(prim.GetPath())))
     if damaged and not clips:
         raise InputError(

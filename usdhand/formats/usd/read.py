@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,14 +22,16 @@ from usdhand.formats.usd.curves import (
     read_curve,
     type_problems,
 )
+from usdhand.formats.usd.damage import first_line, refuses_damage, usd_diagnostics
 from usdhand.formats.usd.names import name_problems, with_names
 from usdhand.formats.usd.poses import authored_poses, placed_skeleton
 from usdhand.formats.usd.samples import Track, steady
-from usdhand.formats.usd.stage import Character, damage_refused, find_character
+from usdhand.formats.usd.stage import Character, find_character
 from usdhand.formats.usd.world import World, world_above, world_problems
 from usdhand.motion import Clip, Origin, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.motion.clip import shears_of
+from usdhand.motion.plausible import check_clip
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS
 from usdhand.motion.transforms import compose_trs, decompose, with_even_signs
@@ -67,16 +69,25 @@ def read_character(path: str | Path, skel: str | None = None) -> Clip:
     return bind_pose_clip(find_character(Path(path), skel))
 
 
+@refuses_damage
 def clip_from_character(character: Character) -> Clip:
     """Read the motion of a character that was found on a stage; see `read_clip`."""
-    with damage_refused(character.path):
-        return _animated_clip(character)
+    return _checked(_animated_clip, character)
 
 
+@refuses_damage
 def bind_pose_clip(character: Character) -> Clip:
     """Return one frame of a character at its bind pose, whether it is animated or not."""
-    with damage_refused(character.path):
-        return _still_clip(character)
+    return _checked(_still_clip, character)
+
+
+def _checked(read: Callable[[Character], Clip], character: Character) -> Clip:
+    """Read a clip; what USD prints on the way are problems of it."""
+    with usd_diagnostics() as messages:
+        clip = read(character)
+    check_clip(clip, character.path)
+    said = (Problem("usd", first_line(message)) for message in messages)
+    return replace(clip, problems=(*clip.problems, *said))
 
 
 def _animated_clip(character: Character) -> Clip:

@@ -15,13 +15,13 @@ from usdhand.anatomy.frames import HandFrames
 from usdhand.anatomy.hand import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError
 from usdhand.formats.usd.character import as_on_stage
+from usdhand.formats.usd.damage import damage_refused, refuses_damage
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, VERSION, author_rig
 from usdhand.formats.usd.rig_source import RigSource, rig_source
 from usdhand.formats.usd.stage import (
     Character,
     bound_animation,
-    damage_refused,
     is_meant,
     open_stage,
 )
@@ -80,6 +80,7 @@ def write_rig(
     output: Path,
     *,
     flatten: bool = False,
+    allow_outside: bool = False,
     force: bool = False,
 ) -> tuple[Problem, ...]:
     """Write a rig over its clip, with the reduced motion baked beside it.
@@ -104,11 +105,13 @@ def write_rig(
         [j for f in frames for j in f.links.moving],
         output,
         flatten=flatten,
+        allow_outside=allow_outside,
         force=force,
         author=author,
     )
 
 
+@refuses_damage
 def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
     """Read the relations of a rig file, without its motion.
 
@@ -130,6 +133,7 @@ def read_rig_on(stage: Usd.Stage, path: Path, skel: str | None = None) -> Reduce
         return _relations(find_rig(stage, path, skel), path)
 
 
+@refuses_damage
 def read_stored_rig(path: str | Path, skel: str | None = None, option: str = "--skel") -> StoredRig:
     """Read a rig file with the curves of its free channels and its character.
 
@@ -137,19 +141,18 @@ def read_stored_rig(path: str | Path, skel: str | None = None, option: str = "--
     """
     path = Path(path)
     stage, problems = open_stage(path)
-    with damage_refused(path):
-        prim = find_rig(stage, path, skel, option)
-        rig = _relations(prim, path)
-        found = _skeleton_path(prim)
-        if found is None:
-            raise InputError(f"{path}: the skeleton of the rig {prim.GetPath()} does not exist.")
-        skeleton = stage.GetPrimAtPath(found)
-        character = Character(stage, path, skeleton, bound_animation(skeleton), problems)
-        clip = clip_from_character(character)
-        curves = [_curve(prim, name, clip.time_codes, path) for name in rig.free]
-        values = np.stack(curves, axis=1) if curves else np.empty((len(clip), 0))
-        frames = _stored_frames(prim, path)
-        source = rig_source(prim)
+    prim = find_rig(stage, path, skel, option)
+    rig = _relations(prim, path)
+    found = _skeleton_path(prim)
+    if found is None:
+        raise InputError(f"{path}: the skeleton of the rig {prim.GetPath()} does not exist.")
+    skeleton = stage.GetPrimAtPath(found)
+    character = Character(stage, path, skeleton, bound_animation(skeleton), problems)
+    clip = clip_from_character(character)
+    curves = [_curve(prim, name, clip.time_codes, path) for name in rig.free]
+    values = np.stack(curves, axis=1) if curves else np.empty((len(clip), 0))
+    frames = _stored_frames(prim, path)
+    source = rig_source(prim)
     return StoredRig(rig, Channels(rig.free, values), character, clip, frames, source)
 
 

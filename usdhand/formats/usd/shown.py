@@ -11,6 +11,7 @@ from pxr import Usd
 
 from usdhand.anatomy.hand import SIDES, Side
 from usdhand.formats.usd.animation import VARIANT_SET
+from usdhand.formats.usd.damage import refuses_damage
 from usdhand.formats.usd.read import bind_pose_clip, clip_from_character
 from usdhand.formats.usd.rig import read_rig_on, rig_prims
 from usdhand.formats.usd.skins import Skin, read_skins
@@ -42,6 +43,7 @@ class ShownMotion:
     notes: tuple[str, ...] = ()
 
 
+@refuses_damage
 def read_shown(
     path: str | Path, skel: str | None = None, *, skins: bool = True
 ) -> list[ShownMotion]:

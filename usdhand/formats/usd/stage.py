@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from pickle import PicklingError
-from typing import Any
 
-from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
+from pxr import Sdf, Tf, Usd, UsdSkel
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.formats.usd.damage import first_line, refuses_damage, sentence, usd_diagnostics
+from usdhand.inputs import why_no_file
 from usdhand.problems import CHOICES, Problem, listed
+from usdhand.witness import opening
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,37 +61,6 @@ class ClosedCharacter:
         return find_character(self.path, self.skeleton)
 
 
-@contextmanager
-def usd_diagnostics() -> Iterator[list[str]]:
-    """Collect what USD would print to stderr, as plain sentences."""
-    delegate = UsdUtils.CoalescingDiagnosticDelegate()
-    messages: list[str] = []
-    try:
-        yield messages
-    finally:
-        messages += [_sentence(d) for d in delegate.TakeUncoalescedDiagnostics()]
-        del delegate
-
-
-@contextmanager
-def damage_refused(path: Path) -> Iterator[None]:
-    """Turn what USD raises on data that it cannot unpack into an error for people.
-
-    Raises
-    ------
-    InputError
-        if the file is damaged inside: it opens, but its values cannot be read.
-    """
-    try:
-        yield
-    except Tf.ErrorException as error:
-        raise InputError(f"{path}: the file is damaged, values cannot be read.") from error
-    except TypeError as error:
-        if "to_python" not in str(error):
-            raise
-        raise InputError(f"{path}: the file is damaged, values cannot be read.") from error
-
-
 def compose(root: str | Sdf.Layer, load: Usd.Stage.InitialLoadSet = Usd.Stage.LoadAll) -> Usd.Stage:
     """Compose a file or layer as a stage. All stages come from here, so that they can be counted.
 
@@ -100,9 +69,12 @@ def compose(root: str | Sdf.Layer, load: Usd.Stage.InitialLoadSet = Usd.Stage.Lo
     Tf.ErrorException
         if it cannot be opened.
     """
+    if isinstance(root, str):
+        opening(root)
     return Usd.Stage.Open(root, load)
 
 
+@refuses_damage
 def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     """Open a stage; what could not be composed comes back as problems.
 
@@ -113,10 +85,8 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     """
     if not is_text(path):
         raise InputError(f"{readable(path)}: this name is not valid UTF-8, which USD needs.")
-    if not path.exists():
-        raise InputError(f"{path}: no such file.")
-    if path.is_dir():
-        raise InputError(f"{path} is a folder, not a USD file.")
+    if why := why_no_file(path):
+        raise InputError(f"{path}: {why}.")
     if path.suffix.lower() not in USD_SUFFIXES:
         raise InputError(
             f"{path}: '{path.suffix}' is not a USD file; expected one of {', '.join(USD_SUFFIXES)}."
@@ -126,17 +96,17 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
         try:
             stage = compose(str(path))
         except Tf.ErrorException as error:
-            messages += [_sentence(e) for e in error.args]
+            messages += [sentence(e) for e in error.args]
     if stage is None:
-        detail = f" ({_first_line(messages[0])})" if messages else ""
+        detail = f" ({first_line(messages[0])})" if messages else ""
         message = "USD cannot read this file; it may be damaged or not USD"
         raise InputError(f"{path}: {message}{detail}.")
     problems = [
-        Problem("composition", f"not everything could be composed: {_first_line(str(error))}")
+        Problem("composition", f"not everything could be composed: {first_line(str(error))}")
         for error in stage.GetCompositionErrors()
     ]
     if not problems:
-        problems = [Problem("usd", _first_line(message)) for message in messages]
+        problems = [Problem("usd", first_line(message)) for message in messages]
     return stage, tuple(problems)
 
 
@@ -160,6 +130,7 @@ def find_skeletons(stage: Usd.Stage) -> list[Usd.Prim]:
     return [prim for prim in everything if prim.IsA(UsdSkel.Skeleton)]
 
 
+@refuses_damage
 def find_character(path: Path, skel: str | None = None) -> Character:
     """Open ``path`` and choose its character.
 
@@ -215,14 +186,3 @@ def is_meant(path: Sdf.Path, skel: str) -> bool:
     if skel.startswith("/") and Sdf.Path.IsValidPathString(skel):
         return bool(path.HasPrefix(Sdf.Path(skel)))
     return skel in str(path).split("/")
-
-
-def _sentence(diagnostic: Any) -> str:
-    try:
-        return str(diagnostic.commentary).strip()
-    except UnicodeDecodeError:  # it quotes bytes of a damaged file
-        return "it has bytes that are not text"
-
-
-def _first_line(text: str) -> str:
-    return text.strip().splitlines()[0].rstrip(".") if text.strip() else "no reason given"

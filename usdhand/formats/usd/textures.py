@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import io
 import itertools
+import os
+import struct
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import Ar, Sdf, UsdShade, UsdUtils
+from pxr import Ar, Sdf, Usd, UsdShade, UsdUtils
 
-from usdhand.formats.usd.stage import usd_diagnostics
+from usdhand.formats.atomic import written_beside
+from usdhand.formats.usd.damage import usd_diagnostics
 from usdhand.problems import Problem
+
+EARLIEST = struct.pack("<HH", 0, 1 << 5 | 1)  # 1980-01-01 00:00
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,25 @@ def missing_files(layer: Sdf.Layer) -> list[str]:
     return [a for a in asset_paths(layer) if Path(a).is_absolute() and not _sources(layer, a)]
 
 
+def outside_files(stage: Usd.Stage, layer: Sdf.Layer, *, packages_only: bool) -> list[str]:
+    """Files that a stage's flat layer takes in from outside the folder of the stage's own file.
+
+    A file from anybody may name any other, which must not leave the machine unsaid.
+    """
+    root = stage.GetRootLayer()
+    own = root.subLayerPaths if root.anonymous else [root.realPath]
+    homes = [os.path.realpath(os.path.dirname(_outer(path))) for path in own]  # noqa: PTH120
+    found: dict[str, None] = {}
+    for asset in asset_paths(layer):
+        if packages_only and not is_packed(asset):
+            continue
+        for source, _ in _sources(layer, asset):
+            path = Path(os.path.realpath(_outer(source)))
+            if not any(path.is_relative_to(home) for home in homes):
+                found[str(path)] = None
+    return list(found)
+
+
 def copy_files(layer: Sdf.Layer, copies: Copies, folder: Path) -> None:
     """Copy files that are not there yet to a folder, and let the layer refer to them."""
     if copies.files:
@@ -90,7 +114,8 @@ def copy_files(layer: Sdf.Layer, copies: Copies, folder: Path) -> None:
     for name, source in copies.files.items():
         target = folder / name
         if not target.exists():
-            target.write_bytes(_read(source))
+            with written_beside(target) as temporary:
+                temporary.write_bytes(_read(source))
     renamed = {asset: (folder / name).as_posix() for asset, name in copies.renamed.items()}
     modify_paths(layer, lambda asset: renamed.get(asset, asset))
 
@@ -150,6 +175,30 @@ def _inner_name(asset: str) -> str:
     while is_packed(asset):
         asset = Ar.SplitPackageRelativePathOuter(asset)[1]
     return asset.rsplit("/", 1)[-1]
+
+
+def without_times(package: Path) -> None:
+    """Give the files in a package the earliest date of a zip: equal content is equal bytes.
+
+    Zip file format, PKWARE APPNOTE 6.3: dates stand in each local header and in the directory.
+    """
+    with zipfile.ZipFile(package) as listed:
+        files, directory = listed.infolist(), listed.start_dir
+    with package.open("rb+") as file:
+        for info in files:
+            file.seek(info.header_offset + 10)
+            file.write(EARLIEST)
+        for _ in files:
+            file.seek(directory)
+            header = file.read(46)
+            file.seek(directory + 12)
+            file.write(EARLIEST)
+            directory += 46 + sum(struct.unpack_from("<HHH", header, 28))
+
+
+def _outer(path: str) -> str:
+    """The file itself, or the package that it is in."""
+    return str(Ar.SplitPackageRelativePathOuter(path)[0]) if is_packed(path) else path
 
 
 def _read(path: str) -> bytes:

@@ -13,6 +13,8 @@ from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import affine, mean_scale, nearest_rotation, to_y_up
 from usdhand.problems import Problem
 
+PLAUSIBLE_CM = (1e-6, 1e9)  # of one unit
+
 
 @dataclass(frozen=True, eq=False)
 class World:
@@ -50,8 +52,11 @@ def world_above(skeleton: Usd.Prim, times: Array | None = None) -> World:
         )
     axes = to_y_up(str(UsdGeom.GetStageUpAxis(stage)))
     cm = 100.0 * UsdGeom.GetStageMetersPerUnit(stage)
-    if not 0 < cm < np.inf:
-        raise InputError(f"{stage.GetRootLayer().realPath}: metersPerUnit is {cm / 100.0:g}.")
+    if not PLAUSIBLE_CM[0] < cm < PLAUSIBLE_CM[1]:
+        raise InputError(
+            f"{stage.GetRootLayer().realPath}: metersPerUnit is {cm / 100.0:g}, "
+            "which is not plausible."
+        )
     return World(
         scale=float(scales[0]) * cm,
         rotation=axes @ nearest_rotation(matrices[:, :3, :3]),

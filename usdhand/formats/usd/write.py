@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
 
-from usdhand.errors import InputError, OutputError, UsdHandError
-from usdhand.formats.output import check_output, written_beside
+from usdhand.errors import OutputError, UsageError, UsdHandError
+from usdhand.formats.atomic import written_beside
+from usdhand.formats.output import check_output
 from usdhand.formats.paths import relative_path
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.add_joints import author_joints, joint_tokens
@@ -20,6 +21,7 @@ from usdhand.formats.usd.animation import animation_losses, author_animation, au
 from usdhand.formats.usd.bindings import bind_animation
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.curves import Tracks
+from usdhand.formats.usd.damage import refuses_damage, usd_diagnostics
 from usdhand.formats.usd.flatten import flat_layer
 from usdhand.formats.usd.stage import (
     Character,
@@ -27,7 +29,6 @@ from usdhand.formats.usd.stage import (
     is_text,
     open_stage,
     readable,
-    usd_diagnostics,
 )
 from usdhand.formats.usd.textures import (
     copies_of,
@@ -36,11 +37,14 @@ from usdhand.formats.usd.textures import (
     is_udim,
     missing_files,
     modify_paths,
+    outside_files,
     unpacked_beside,
+    without_times,
 )
 from usdhand.motion import Clip
+from usdhand.motion.plausible import check_clip
 from usdhand.motion.timing import SAME_CODE
-from usdhand.problems import Problem
+from usdhand.problems import Problem, listed
 
 ANIMATION_NAME = "HandMotion"
 # Fields of a root layer that are about the layer itself; all others describe the stage.
@@ -56,6 +60,7 @@ LAYER_FIELDS = {
 }
 
 
+@refuses_damage
 def write_motion(
     character: Character,
     clip: Clip,
@@ -63,6 +68,7 @@ def write_motion(
     output: Path,
     *,
     flatten: bool = False,
+    allow_outside: bool = False,
     force: bool = False,
     inputs: Sequence[str | Path] = (),
     variants: Mapping[str, Clip] | None = None,
@@ -76,6 +82,7 @@ def write_motion(
     ----------
     changed : joints whose motion differs from the input's; all others are kept to the bit
     flatten : write one file that needs no other (always done for .usdz)
+    allow_outside : pack files from outside the input's folder, too
     inputs : further files that the output must not replace
     variants : name -> motion of the same frames: a variant set of the new animation, the first one
         selected, instead of ``clip`` alone
@@ -90,7 +97,7 @@ def write_motion(
     Raises
     ------
     InputError
-        if the clip is of another skeleton, or has rotations that are no numbers.
+        if the clip is of another skeleton, or has values that are not plausible.
     OutputError
         if the output is refused or cannot be written; nothing is left behind then.
     """
@@ -100,8 +107,7 @@ def write_motion(
         name: as_on_stage(motion, character) for name, motion in (variants or {"": clip}).items()
     }
     for motion in clips.values():
-        if not np.isfinite(motion.rotations).all():
-            raise InputError(f"{character.path}: the result has rotations that are not numbers.")
+        check_clip(motion, character.path, "the result")
     skeleton = next(iter(clips.values())).skeleton
     changed = sorted({*changed, *range(len(joint_tokens(character)), len(skeleton))})
     layer = layer_over(character.stage)
@@ -123,10 +129,13 @@ def write_motion(
         if author is not None:
             author(layer, root)
     lost = () if variants else tuple(animation_losses(layer, animation, clips[""]))
-    return (*shared, *lost, *save_layer(layer, output, flatten=flatten))
+    saved = save_layer(layer, output, flatten=flatten, allow_outside=allow_outside)
+    return (*shared, *lost, *saved)
 
 
-def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> tuple[Problem, ...]:
+def save_layer(
+    layer: Sdf.Layer, output: Path, *, flatten: bool, allow_outside: bool = False
+) -> tuple[Problem, ...]:
     """Save a layer to ``output``: written beside, opened once to see that it holds, then moved.
 
     Its sublayers are given as absolute paths; what is not flattened gets relative ones.
@@ -137,7 +146,7 @@ def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> tuple[Proble
     if flatten or output.suffix.lower() == ".usdz":
         with usd_diagnostics():
             stage = compose(layer)
-        return save_flat(stage, output)
+        return save_flat(stage, output, allow_outside=allow_outside)
     check_name(output)
     problems = _make_relative(layer, output)
     with written_beside(output) as temporary:
@@ -147,12 +156,26 @@ def save_layer(layer: Sdf.Layer, output: Path, *, flatten: bool) -> tuple[Proble
     return problems
 
 
-def save_flat(stage: Usd.Stage, output: Path) -> tuple[Problem, ...]:
-    """Save all of a stage as one file, or package; see `save_layer`."""
+def save_flat(
+    stage: Usd.Stage, output: Path, *, allow_outside: bool = False
+) -> tuple[Problem, ...]:
+    """Save all of a stage as one file, or package; see `save_layer`.
+
+    Raises
+    ------
+    UsageError
+        if files from outside the input's folder would be taken in and that is not allowed.
+    """
     check_name(output)
     flat, problems = flat_layer(stage)
+    packed = output.suffix.lower() == ".usdz"
+    if not allow_outside and (found := outside_files(stage, flat, packages_only=not packed)):
+        raise UsageError(
+            f"{output}: {listed(found)} would be packed, from outside the input's folder. Give "
+            "--allow-outside if that is meant."
+        )
     with ExitStack() as undone, written_beside(output) as temporary:
-        if output.suffix.lower() == ".usdz":
+        if packed:
             problems += _package(flat, temporary, output)
         else:
             problems += undone.enter_context(unpacked_beside(flat, output))
@@ -216,7 +239,7 @@ def _absolute(paths: Iterable[str], output: Path) -> tuple[Problem, ...]:
 
 
 def _package(flat: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, ...]:
-    with TemporaryDirectory(prefix=f".{output.stem}.", dir=output.absolute().parent) as folder:
+    with TemporaryDirectory(prefix=f"{temporary.stem}.", dir=temporary.parent) as folder:
         # USD packs UDIM tiles only where they are below the layer, and packages as a whole.
         copies = copies_of(flat, lambda asset: is_udim(asset) or is_packed(asset))
         copy_files(flat, copies, Path(folder, "textures"))
@@ -230,6 +253,7 @@ def _package(flat: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, .
         if not done:
             reason = f"; not found: {', '.join(missing)}" if missing else ""
             raise OutputError(f"{output}: USD could not make the .usdz package{reason}.")
+        without_times(temporary)
     return tuple(Problem("usd", message) for message in messages)
 
 
@@ -271,7 +295,7 @@ def layer_over(stage: Usd.Stage) -> Sdf.Layer:
     if source.anonymous:
         layer.TransferContent(source)
         return layer
-    for field in source.pseudoRoot.ListInfoKeys():
+    for field in sorted(source.pseudoRoot.ListInfoKeys()):  # listed by memory address
         if field not in LAYER_FIELDS:
             layer.pseudoRoot.SetInfo(field, source.pseudoRoot.GetInfo(field))
     layer.timeCodesPerSecond = stage.GetTimeCodesPerSecond()

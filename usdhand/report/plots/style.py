@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 
 from usdhand.errors import UsageError
-from usdhand.formats.output import check_folder, check_output, make_folder, written_beside
+from usdhand.formats.atomic import written_beside
+from usdhand.formats.output import check_folder, check_output, make_folder
 from usdhand.motion.rotations import Array
 
 if TYPE_CHECKING:

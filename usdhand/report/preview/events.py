@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from usdhand.anatomy import SIDES, Side
 from usdhand.errors import InputError, UsageError
+from usdhand.inputs import read_json
 from usdhand.motion.rotations import Array
 
 if TYPE_CHECKING:
@@ -30,10 +30,10 @@ def read_report(path: Path) -> dict[str, Any]:
         if it is one of another verb.
     """
     try:
-        report = json.loads(path.read_text(encoding="utf-8"))
+        report = read_json(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
-    except (RecursionError, ValueError) as error:
+    except ValueError as error:
         raise InputError(f"{path}: no JSON ({error}).") from error
     verb = report_verb(report)
     if verb not in SHOWN_VERBS:
@@ -75,7 +75,12 @@ def lane_of(
     """
     of = report["inputs"][: 2 if report_verb(report) == "splice" else 1]
     made = [Path(str(report["output"]))] if report.get("output") else []
-    places = {p.resolve() for m in made for p in (m, path.parent / m, path.with_name(m.name))}
+    places = {
+        found
+        for m in made
+        for p in (m, path.parent / m, path.parent / m.name)
+        if (found := _resolved(p))
+    }
     files = [lane.clip.origin.path for lane in lanes]
     fitting = [
         lane
@@ -92,6 +97,13 @@ def lane_of(
         )
     alternatives = [x for x in fitting if x.clip.origin.path == fitting[0].clip.origin.path]
     return min(alternatives, key=lambda lane: lane.alternative)
+
+
+def _resolved(path: Path) -> Path | None:
+    try:
+        return path.resolve()
+    except (OSError, ValueError, RuntimeError):  # no name that a file can have
+        return None
 
 
 def report_rows(report: Mapping[str, Any], path: Path) -> list[dict[str, Any]]:
@@ -115,8 +127,9 @@ def retiming(report: Mapping[str, Any]) -> tuple[str, dict[Side, Array]]:
     """Hash of the hand clip of a splice, and its warps (n, 2) [body s, hand s]; "" for others."""
     if report_verb(report) != "splice" or len(report["inputs"]) < 2:
         return "", {}
-    warps = {s: np.asarray(report["hands"][s]["warp"], float) for s in report["hands"]}
-    return str(report["inputs"][1]["sha256"]), {s: warps[s] for s in SIDES if s in warps}
+    hands = report["hands"]
+    warps = {s: np.asarray(hands[s]["warp"], float) for s in SIDES if s in hands}
+    return str(report["inputs"][1]["sha256"]), warps
 
 
 def warp_rows(warps: Mapping[Side, Array], fps: float) -> list[dict[str, Any]]:

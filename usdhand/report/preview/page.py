@@ -15,6 +15,7 @@ from urllib.parse import quote
 from xml.etree import ElementTree
 
 from usdhand.errors import InputError
+from usdhand.inputs import why_no_file
 from usdhand.version import __version__
 
 FIGURE_TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
@@ -73,6 +74,8 @@ def figure(path: Path) -> dict[str, str]:
     kind = FIGURE_TYPES.get(path.suffix.lower())
     if kind is None:
         raise InputError(f"{path}: not a figure; use one of {', '.join(FIGURE_TYPES)}.")
+    if why := why_no_file(path):
+        raise InputError(f"{path}: {why}.")
     try:
         content = path.read_bytes()
     except OSError as error:
