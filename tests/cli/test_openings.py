@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -108,7 +108,16 @@ def test_every_input_is_opened_once(
     assert opened == expected + Counter({OUTPUT: len(usd)})
 
 
-def test_many_clips_are_opened_once_each(tmp_path: Path, opened: Counter[str]) -> None:
+def here(work: Callable[[object], object], items: Sequence[object], jobs: int) -> Iterator[object]:
+    """What workers do, where openings are counted."""
+    assert jobs == 1
+    yield from ((item, work(item)) for item in items)
+
+
+def test_many_clips_are_opened_once_each(
+    tmp_path: Path, opened: Counter[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("usdhand.verbs.library.each_apart", here)
     clips = Counter(path.name for path in GESTURES)
     run("reduce", *GESTURES, "-o", tmp_path / "rigs", "-q")
     assert opened == clips + Counter({OUTPUT: len(GESTURES)})

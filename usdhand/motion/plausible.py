@@ -30,29 +30,27 @@ def check_clip(clip: Clip, file: str | Path, what: str = "") -> None:
     InputError
         if there is such a value; it names the first one, with its joint and frame.
     """
-    skeleton, said = clip.skeleton, f"{what or 'the motion'} has"
-    poses = (("bind", skeleton.bind), ("rest", skeleton.rest))
-    for name, pose in poses:
+    skeleton, of = clip.skeleton, f" of {what}" if what else ""
+
+    def refuse(joint: int, has: str) -> None:
+        raise InputError(
+            f"{file}: joint {skeleton.joints[joint]}{of} {has}, which is not plausible. Check the "
+            "units and transforms above the skeleton."
+        )
+
+    for name, pose in (("bind", skeleton.bind), ("rest", skeleton.rest)):
         if (at := _first_bad(pose)) is not None:
-            _refuse(file, said, f"a {name} transform", pose[at], skeleton.joints[at[0]])
-    for name, values in (
-        ("rotation", clip.rotations),
-        ("translation", clip.translations),
-        ("scale", clip.scales),
-    ):
+            refuse(at[0], f"has a {name} transform with the value {pose[at]:g}")
+    for name, values in (("rotation", clip.rotations), ("scale", clip.scales)):
         if (at := _first_bad(values)) is not None:
-            where = f"{skeleton.joints[at[1]]}, time code {clip.time_code(at[0]):g}"
-            _refuse(file, said, f"a {name}", values[at], where)
+            when = f"at time code {clip.time_code(at[0]):g}"
+            refuse(at[1], f"has a {name} with the value {values[at]:g} {when}")
+    if (at := _first_bad(clip.translations)) is not None:
+        far = np.linalg.norm(clip.translations[at[:2]])
+        when = f"at time code {clip.time_code(at[0]):g}"
+        refuse(at[1], f"is {far:.3g} cm from its parent {when}")
     if not 0.0 < clip.fps < np.inf:
         raise InputError(f"{file}: {clip.fps:g} frames a second are not plausible.")
-
-
-def _refuse(file: str | Path, said: str, name: str, value: float, where: str) -> None:
-    advice = "Check the units, scales and transforms above the skeleton"
-    raise InputError(
-        f"{file}: {said} {name} with the value {value:g}, which is not plausible ({where}). "
-        f"{advice}."
-    )
 
 
 def _first_bad(values: Array | NDArray[np.floating]) -> tuple[int, ...] | None:

@@ -71,12 +71,14 @@ def time_codes(frames: Array | float, first: float, step: float) -> Array:
     ----------
     first, step : time code of frame 0, and distance of two frames
     """
-    if math.isfinite(first) and math.isfinite(step):
+    if abs(first) < _LARGEST_WHOLE and abs(step) < _LARGEST_WHOLE:
         start, by = exact(first), exact(step)
         whole = math.lcm(start.denominator, by.denominator)
+        if whole >= _LARGEST_WHOLE:
+            return np.asarray(first + frames * step)
         a, b = int(start * whole), int(by * whole)
         largest = abs(a) + float(np.max(np.abs(frames), initial=0.0)) * abs(b)
-        if max(largest, whole) < _LARGEST_WHOLE:
+        if largest < _LARGEST_WHOLE:
             return np.asarray((a + frames * b) / whole)
     return np.asarray(first + frames * step)
 

@@ -55,6 +55,16 @@ def read_band(text: str) -> tuple[float, float]:
     return first, second
 
 
+LIMITS = {
+    "least_band": (0.0, 1e4),
+    "fps": (1.0, 1000.0),
+    "smoothing": (0.001, 10.0),
+    "shared_smoothing": (0.001, 10.0),
+    "dead_zone": (0.0, 10.0),
+    "tether": (0.0, 1e4),
+}
+
+
 @displayed()
 @dataclass(frozen=True)
 class SpliceSettings:
@@ -103,6 +113,9 @@ class SpliceSettings:
         check_choices(self)
         if not all(0.0 < width <= 1.0 for width in self.band):
             raise UsageError("Bands are shares of the body's length: above 0 and at most 1.")
+        for name, (least, most) in LIMITS.items():
+            if not least <= (value := getattr(self, name)) <= most:
+                raise UsageError(f"{name} is {value:g}; it must be from {least:g} to {most:g}.")
 
 
 # Signs along x, y and z only, as the paper has them.

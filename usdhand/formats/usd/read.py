@@ -37,6 +37,8 @@ from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS
 from usdhand.motion.transforms import compose_trs, decompose, with_even_signs
 from usdhand.problems import Problem
 
+LATEST_TIME_CODE = 1e12
+
 
 def read_clip(path: str | Path, skel: str | None = None) -> Clip:
     """Read the motion of one character.
@@ -98,6 +100,7 @@ def _animated_clip(character: Character) -> Clip:
     parents = parents_from_paths(joints)
     targets = _targets(character, animation, joints)
     tracks = Tracks.of(animation, len(targets))
+    _check_times(character, tracks)
     timing, resampled = frame_timing(character.stage, tracks.times)
     times = timing.times
     world = world_above(character.skeleton, times)
@@ -136,6 +139,16 @@ def _animated_clip(character: Character) -> Clip:
         )
     name = character.path.stem
     return Clip(skeleton, q, t, scales, timing.fps, name, origin, problems, character, shears)
+
+
+def _check_times(character: Character, tracks: Tracks) -> None:
+    """Refuse time codes that cannot be meant, before frames are counted with them."""
+    for times in tracks.times:
+        if len(times) and not max(abs(times[0]), abs(times[-1])) < LATEST_TIME_CODE:
+            raise InputError(
+                f"{character.path}: the animation has time codes from {times[0]:g} to "
+                f"{times[-1]:g}, which are not plausible."
+            )
 
 
 def _still_clip(character: Character) -> Clip:
