@@ -1,6 +1,7 @@
 """Damaged files of every kind through the verbs, in forked children with limits.
 
 usage: python campaign.py [--tries N] [--seed N] [--formats bvh,usda,...] [--keep FOLDER]
+    [--corpus FOLDER] [--minutes M]
 
 Of each try, one of these comes: it works, and no value that was written is not finite; it is
 refused in words, and nothing was written; USD crashes, which the program's own guard tells. All
@@ -66,16 +67,22 @@ USED = (
 
 @dataclass(frozen=True)
 class Try:
-    """One damaged file: its kind, and the number that its damage follows from."""
+    """One damaged file: its kind, and the number that its damage and its verb follow from.
+
+    One that failed before is in a file.
+    """
 
     kind: str
     number: int
+    file: Path | None = None
 
     @property
     def seed(self) -> str:
         return self.kind if self.kind.count(".") else f"s.{self.kind}"
 
     def content(self, seeds: Path) -> bytes:
+        if self.file is not None:
+            return self.file.read_bytes().replace(b"SEEDS", os.fsencode(seeds))
         rng = random.Random(f"{self.kind} {self.number}")
         return damaged((seeds / self.seed).read_bytes(), self.kind.rpartition(".")[2], rng)
 
@@ -262,11 +269,28 @@ def report(counts: dict[str, collections.Counter[str]]) -> str:
     return "\n".join([*lines, f"{sum(sum(count.values()) for count in counts.values())} tries"])
 
 
+def kept(folder: Path) -> list[Try]:
+    """Inputs that failed before: NAME_NUMBER_SEED."""
+    tries = []
+    for file in sorted(folder.iterdir()):
+        _, number, seed = file.name.rsplit("_", 2)
+        tries.append(Try(seed.removeprefix("s."), int(number), file))
+    return tries
+
+
+def keep(tried: Try, result: Result, folder: Path, seeds: Path) -> None:
+    """Keep an input that failed."""
+    folder.mkdir(exist_ok=True, parents=True)
+    name = f"{result.what.replace(' ', '-')}_{tried.number}_{tried.seed}"
+    (folder / name).write_bytes(tried.content(seeds).replace(os.fsencode(seeds), b"SEEDS"))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--tries", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--formats", default=",".join(SHARES))
+    parser.add_argument("--corpus", type=Path, help="folder of inputs that failed before, instead")
     parser.add_argument("--keep", type=Path, help="folder for inputs that failed or crashed USD")
     parser.add_argument("--minutes", type=float, default=1e9)
     given = parser.parse_args()
@@ -275,19 +299,14 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         seeds = Path(name)
         make_seeds(seeds)
-        for tried, result in campaign(
-            planned(given.tries, given.seed, given.formats.split(",")), seeds
-        ):
+        drawn = planned(given.tries, given.seed, given.formats.split(","))
+        for tried, result in campaign(kept(given.corpus) if given.corpus else drawn, seeds):
             counts[tried.kind][result.what] += 1
             if result.what not in ("works", "refused"):
                 failed += result.failed
                 print(tried.kind, tried.number, result.what, result.detail, flush=True)
                 if given.keep:
-                    given.keep.mkdir(exist_ok=True, parents=True)
-                    path = (
-                        given.keep / f"{result.what.replace(' ', '_')}_{tried.number}_{tried.seed}"
-                    )
-                    path.write_bytes(tried.content(seeds))
+                    keep(tried, result, given.keep, seeds)
             if time.monotonic() > end:
                 break
     print(report(counts))

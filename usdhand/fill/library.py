@@ -25,6 +25,9 @@ ARM_FPS = 30.0
 # Angles are continuous in time, so that some go beyond a turn; no finger turns ten times.
 LARGEST_ANGLE_DEG = 3600.0
 
+# How far from 1 a length may be for a unit vector of single precision.
+ROUNDED = 1e-6
+
 # Parts of a body that are filled on their own, or both hands as one.
 Part = tuple[Side, ...]
 
@@ -223,5 +226,7 @@ def unpack_arm(packed: Array) -> ArmMotion:
     named = dict(zip((name for name, _ in _ARM_FIELDS), columns, strict=True))
     for name in ("hips_palm", "chest_palm", "upper_arm", "forearm", "wrist"):
         length = np.linalg.norm(named[name], axis=1, keepdims=True)
-        named[name] = named[name] / np.where(length > 1e-9, length, 1.0)
+        # What was rounded to single precision stays: a library that is read is written to the bit.
+        off = (np.abs(length - 1.0) > ROUNDED) & (length > 1e-9)
+        named[name] = named[name] / np.where(off, length, 1.0)
     return ArmMotion(**named)
