@@ -263,3 +263,24 @@ def test_signals_reach_the_work(clips: Path, tmp_path: Path, number: signal.Sign
 def test_errors_of_files_have_their_exit_codes() -> None:
     assert issubclass(CrashedError, InputError)
     assert (CrashedError.exit_code, UnforeseenError.exit_code) == (3, 1)
+
+
+@posix
+def test_nothing_but_our_own_words_reaches_people(tmp_path: Path) -> None:
+    """USD prints to the number of stderr when a table of a crate is said to lie beyond its end."""
+    path = tmp_path / "beyond.usdc"
+    usdhand.write_new(short_clip(), path)
+    data = bytearray(path.read_bytes())
+    table = int.from_bytes(data[16:24], "little")
+    data[table + 24 : table + 32] = (4_110_440_000).to_bytes(8, "little")
+    path.write_bytes(data)
+    done = shell("inspect", path)
+    assert done.returncode == 3
+    assert done.stdout == ""
+    assert done.stderr.startswith(f"Error: {path}")
+    assert len(done.stderr.splitlines()) == 1
+    text = tmp_path / "long.usda"
+    text.write_text('#usda 1.0\ndef Xform "a" { double x = ' + "z" * 9000 + " }\n")
+    done = shell("inspect", text)
+    assert done.returncode == 3
+    assert len(done.stderr) < 500

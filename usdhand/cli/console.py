@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from usdhand.problems import Problem
 
+LONGEST = 2000  # characters of a line
 LEAST_STEPS = 3  # with fewer, no bar is shown
 
 
@@ -20,8 +21,12 @@ def say(text: str) -> None:
 
 
 def complain(text: str) -> None:
-    """Print to stderr what went wrong."""
-    click.echo(_printable(text), err=True)
+    """Print to stderr what went wrong; what it quotes of a damaged file may be of any length."""
+    lines = _printable(text).splitlines()
+    short = (
+        x if len(x) <= LONGEST else f"{x[: LONGEST // 2]} ... {x[-LONGEST // 2 :]}" for x in lines
+    )
+    click.echo("\n".join(short), err=True)
 
 
 def _printable(text: str) -> str:

@@ -31,8 +31,19 @@ def main() -> None:
     signal.signal(signal.SIGINT, interrupt if before is signal.default_int_handler else before)
     end_with_parent(parent)
     without_core_dump()
+    if "--debug" not in sys.argv:
+        _without_noise()
     listen(lambda path: os.write(telling, os.fsencode(path) + b"\0"))
     _work()
+
+
+def _without_noise() -> None:
+    """Let nothing but our own words reach stderr: C++ libraries print to its number."""
+    own = os.dup(2)
+    sys.stderr = open(own, "w", buffering=1, errors="backslashreplace")  # noqa: PTH123, SIM115
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
+    os.close(null)
 
 
 def _work() -> None:

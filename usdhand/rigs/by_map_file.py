@@ -10,7 +10,7 @@ from typing import Any
 from usdhand.anatomy.hand import ARM_JOINTS, HAND_JOINTS, SIDES, CharacterMap, HandMap, Side
 from usdhand.errors import HandNotFoundError
 from usdhand.rigs.convention_match import is_hand
-from usdhand.rigs.conventions import METACARPALS, TIPS
+from usdhand.rigs.conventions import LONGEST, METACARPALS, TIPS
 from usdhand.rigs.joint_names import NamedJoints
 
 
@@ -74,7 +74,8 @@ def _lookup(rig: NamedJoints, table: str, role: str, name: str) -> int:
     if joint is None:
         many = rig.skeleton.names.count(name)
         why = f"is the name of {many} joints: give a path" if many else "is not in the skeleton"
-        raise HandNotFoundError(f"map file, [{table}] {role}: '{name}' {why}")
+        shown = name if len(name) <= LONGEST else f"{name[:LONGEST]}..."
+        raise HandNotFoundError(f"map file, [{table}] {role}: '{shown}' {why}")
     return joint
 
 

@@ -42,6 +42,7 @@ HAND_ROLES: tuple[str, ...] = (
 
 MOST_BYTES = 1_000_000  # of a map file
 MOST_DOTS = 100  # in a line of one
+LONGEST = 100  # characters of a value in a message
 
 _SETTINGS = ("about", "like", "side", "digit", "prefix")
 _SHORTHANDS = ("thumb", "thumb_tip", "thumb_carpal", "finger", "metacarpal", "tip")
@@ -206,9 +207,11 @@ def _explicit(table: Mapping[str, Any], name: str, where: str) -> dict[str, str]
     allowed = BODY_JOINTS if name == "body" else HAND_ROLES
     for key, value in table.items():
         if key not in allowed:
-            raise UsageError(f"{where} {key}: unknown joint; use one of {', '.join(allowed)}")
+            raise UsageError(
+                f"{where} {_short(key)}: unknown joint; use one of {', '.join(allowed)}"
+            )
         if not isinstance(value, str) or not value:
-            raise UsageError(f"{where} {key}: must be the name of a joint, not {value!r}")
+            raise UsageError(f"{where} {key}: must be the name of a joint, not {_short(value)}")
     return dict(table)
 
 
@@ -216,7 +219,9 @@ def _check(table: Mapping[str, Any], where: str) -> None:
     """Refuse a convention whose keys or values are not of the documented form."""
     for key, value in table.items():
         if key not in _KEYS:
-            raise UsageError(f"{where} {key}: unknown key; use one of {', '.join(sorted(_KEYS))}")
+            raise UsageError(
+                f"{where} {_short(key)}: unknown key; use one of {', '.join(sorted(_KEYS))}"
+            )
         if key in ("about", "like"):
             good, form = isinstance(value, str), "a string"
         elif key in ("side", "digit"):
@@ -228,7 +233,13 @@ def _check(table: Mapping[str, Any], where: str) -> None:
         else:
             good, form = _is_name(value), "a name or a list of names"
         if not good:
-            raise UsageError(f"{where} {key}: must be {form}, not {value!r}")
+            raise UsageError(f"{where} {key}: must be {form}, not {_short(value)}")
+
+
+def _short(value: object) -> str:
+    """What a message quotes of a value."""
+    text = value if isinstance(value, str) and value.isidentifier() else repr(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
 def _is_sequence(value: object) -> TypeGuard[Sequence[object]]:
