@@ -91,15 +91,19 @@ def _to_disk(path: Path) -> None:
         os.fsync(file.fileno())
 
 
+def ending_signals() -> list[signal.Signals]:
+    """Signals that tell a program to end; what is ignored, such as SIGHUP below nohup, stays so."""
+    kinds = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    return [kind for kind in kinds if signal.getsignal(kind) is not signal.SIG_IGN]
+
+
 @contextmanager
 def _ended_by_exception() -> Iterator[None]:
     """Turn SIGTERM and SIGHUP into an exception, so that what was begun is cleaned up."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    kinds = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    # What is ignored, such as SIGHUP below nohup, stays so.
-    kinds = [kind for kind in kinds if signal.getsignal(kind) is not signal.SIG_IGN]
+    kinds = ending_signals()
 
     def end(number: int, _: object) -> None:
         for kind in kinds:

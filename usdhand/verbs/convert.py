@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -23,10 +21,7 @@ from usdhand.formats.files import (
     write_other,
 )
 from usdhand.formats.output import (
-    check_folder,
     check_output,
-    check_outputs,
-    make_folder,
 )
 from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.formats.sources import character_under
@@ -47,6 +42,7 @@ from usdhand.report.convert import convert_result, summary
 from usdhand.requests.convert import ConvertRequest, Edits, UpAxis
 from usdhand.rigs import Conventions, load_conventions, map_character
 from usdhand.verbs.clips import find_hands, misleading_names
+from usdhand.verbs.convert_jobs import Job, jobs_of
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 from usdhand.workers import each_apart
@@ -287,18 +283,6 @@ def _hips(clip: Clip, conventions: Conventions | None) -> int:
 
 
 @dataclass(frozen=True)
-class _Job:
-    """One file to write."""
-
-    path: Path
-    reading: Reading
-    target: Path
-
-    def __str__(self) -> str:
-        return str(self.path)
-
-
-@dataclass(frozen=True)
 class _Done:
     """What came of it: the report's part, what is odd about the file, and what is lost."""
 
@@ -313,7 +297,7 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
         raise UsageError("--onto-skel chooses a skeleton of --onto CHARACTER, which is not given.")
     conventions = load_conventions(*request.maps)
     paths = find_files(request.files)
-    jobs, code = _jobs(paths, request, journal)
+    jobs, code = jobs_of(paths, request, journal)
     results: list[dict[str, Any]] = []
     written: list[Path] = []
     each = partial(_converted, request=request, conventions=conventions)
@@ -344,7 +328,7 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
     )
 
 
-def _converted(job: _Job, request: ConvertRequest, conventions: Conventions | None) -> _Done:
+def _converted(job: Job, request: ConvertRequest, conventions: Conventions | None) -> _Done:
     done = convert(
         job.path,
         job.target,
@@ -358,55 +342,8 @@ def _converted(job: _Job, request: ConvertRequest, conventions: Conventions | No
         dry_run=request.dry_run,
     )
     result = convert_result(done.source, done.clip, done.animated, done.lost, conventions)
-    clips = (done.source, done.clip) if request.onto is not None else ()
-    misled = (problem for clip in clips for problem in misleading_names(clip, conventions))
-    return _Done(result, (*done.source.problems, *misled), done.lost)
-
-
-def _jobs(
-    paths: Sequence[Path], request: ConvertRequest, journal: Journal
-) -> tuple[list[_Job], int]:
-    """What to read and where to write it, and the exit code of files that cannot be read."""
-    output, folder = request.output, request.out_dir
-    if output is not None and folder is None:
-        if request.to is not None and output.suffix.lower() != f".{request.to}":
-            raise UsageError(f"--to {request.to} and -o {output} contradict each other.")
-        if len(paths) > 1:
-            raise UsageError(f"{len(paths)} inputs need --out-dir DIR instead of -o.")
-        check_output(output, paths, request.force, WRITABLE)
-        return [_Job(paths[0], request.reading, output)], 0
-    if folder is None or output is not None:
-        raise UsageError("Give either -o OUTPUT or --out-dir DIR.")
-    check_folder(folder)
-    jobs: list[_Job] = []
-    code = 0
-    stems = Counter(path.stem for path in paths)
-    for path in paths:
-        try:
-            # Files of one name in several formats keep their suffixes, to be told apart.
-            stem = path.stem if stems[path.stem] == 1 else path.name
-            each = _each(path, stem, request.reading)
-        except UsdHandError as error:
-            journal.fail(error)
-            code = max(code, error.exit_code)
-            continue
-        suffix = request.to or "usdc"
-        jobs += [_Job(path, own, folder / f"{name}.{suffix}") for name, own in each]
-    counts = Counter(job.target for job in jobs)
-    if double := next((target for target, count in counts.items() if count > 1), None):
-        raise UsageError(f"Two results would both be {double}; convert them to several folders.")
-    make_folder(folder)
-    check_outputs([job.target for job in jobs], paths, request.force, WRITABLE)
-    return jobs, code
-
-
-def _each(path: Path, stem: str, reading: Reading) -> list[tuple[str, Reading]]:
-    """A name and a reading for every animation of a file."""
-    names = () if reading.animation is not None else animation_names(path)
-    if len(names) < 2:
-        return [(stem, reading)]
-    return [(f"{stem}.{_file_part(name)}", replace(reading, animation=name)) for name in names]
-
-
-def _file_part(name: str) -> str:
-    return "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
+    odd = done.source.problems
+    if request.onto is not None:
+        for clip in (done.source, done.clip):
+            odd += misleading_names(clip, conventions)
+    return _Done(result, odd, done.lost)

@@ -20,6 +20,7 @@ from usdhand.errors import (
 )
 from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.fill.settings import Segmentation
+from usdhand.formats.atomic import ending_signals
 from usdhand.formats.output import check_output
 from usdhand.formats.usd.library import is_library, read_library, write_library
 from usdhand.inputs import read_text
@@ -148,25 +149,28 @@ def _what_is_kept(output: Path) -> str:
 
 
 class _Terminated(KeyboardInterrupt):
-    """SIGTERM while clips are read."""
+    """SIGTERM or SIGHUP while clips are read."""
 
 
 @contextmanager
 def _terminated_as_interrupted() -> Iterator[None]:
-    """SIGTERM raises `_Terminated`, so that what was read so far is kept."""
-
-    def terminate(*_: object) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
-        raise _Terminated
-
+    """SIGTERM and SIGHUP raise `_Terminated`, so that what was read so far is kept."""
     if threading.current_thread() is not threading.main_thread():
         yield  # signals are the main thread's
         return
-    before = signal.signal(signal.SIGTERM, terminate)
+    kinds = ending_signals()
+
+    def terminate(*_: object) -> None:
+        for kind in kinds:
+            signal.signal(kind, signal.SIG_IGN)  # once is enough
+        raise _Terminated
+
+    before = {kind: signal.signal(kind, terminate) for kind in kinds}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for kind, handler in before.items():
+            signal.signal(kind, handler)
 
 
 def _segmentation(request: LibraryBuildRequest, previous: MotionLibrary | None) -> Segmentation:
