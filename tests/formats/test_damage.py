@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -255,3 +256,18 @@ def test_files_from_outside_are_packed_only_if_that_is_allowed(tmp_path: Path) -
     run("convert", textured(own, "textures/skin.png"), "-o", out)
     run("reduce", textured(own, "../secret.png"), "-o", own / "rig.usdz", code=2)
     run("convert", textured(own, "../secret.png"), "-o", own / "out.usda")
+
+
+def test_compressed_files_in_packages_are_refused(tmp_path: Path) -> None:
+    """USD refuses layers; textures could be of any size."""
+    (tmp_path / "skin.png").write_bytes(b"skin" * 1000)
+    whole, odd = tmp_path / "whole.usdz", tmp_path / "odd.usdz"
+    run("convert", textured(tmp_path, "skin.png"), "-o", whole)
+    for packed, code in ((".png", 3), (".usdc", 3), (".none", 0)):
+        with zipfile.ZipFile(whole) as source, zipfile.ZipFile(odd, "w") as target:
+            for info in source.infolist():
+                stored = not info.filename.endswith(packed)
+                kind = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
+                target.writestr(info.filename, source.read(info), kind)
+        said = run("convert", odd, "-o", tmp_path / "out.usda", "--force", code=code).stderr
+        assert "compressed" in said or not code

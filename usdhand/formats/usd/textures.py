@@ -14,6 +14,7 @@ from pathlib import Path
 
 from pxr import Ar, Sdf, Usd, UsdShade, UsdUtils
 
+from usdhand.errors import InputError
 from usdhand.formats.atomic import written_beside
 from usdhand.formats.usd.damage import usd_diagnostics
 from usdhand.problems import Problem
@@ -177,6 +178,17 @@ def _inner_name(asset: str) -> str:
     return asset.rsplit("/", 1)[-1]
 
 
+def _entry(data: Path | io.BytesIO, name: str, path: str) -> bytes:
+    """Read a file in a package, where nothing may be compressed: small ones could be huge."""
+    try:
+        with zipfile.ZipFile(data) as package:
+            if package.getinfo(name).compress_type != zipfile.ZIP_STORED:
+                raise InputError(f"{path}: it is compressed, which a .usdz does not allow.")
+            return package.read(name)
+    except (KeyError, zipfile.BadZipFile, EOFError, NotImplementedError) as error:
+        raise InputError(f"{path}: cannot be read from its package ({error}).") from error
+
+
 def without_times(package: Path) -> None:
     """Give the files in a package the earliest date of a zip: equal content is equal bytes.
 
@@ -209,8 +221,7 @@ def _read(path: str) -> bytes:
     data: Path | io.BytesIO = Path(outer)
     while True:
         name, rest = Ar.SplitPackageRelativePathOuter(inner) if is_packed(inner) else (inner, "")
-        with zipfile.ZipFile(data) as package:
-            content = package.read(name)
+        content = _entry(data, name, path)
         if not rest:
             return content
         data, inner = io.BytesIO(content), rest
