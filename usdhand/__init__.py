@@ -28,12 +28,14 @@ if TYPE_CHECKING:
     from usdhand.anatomy.hand import HandMap as HandMap
     from usdhand.anatomy.hand import Side as Side
     from usdhand.errors import CancelledError as CancelledError
+    from usdhand.errors import CrashedError as CrashedError
     from usdhand.errors import HandNotFoundError as HandNotFoundError
     from usdhand.errors import InputError as InputError
     from usdhand.errors import InterruptedBuildError as InterruptedBuildError
     from usdhand.errors import OutputError as OutputError
     from usdhand.errors import QualityError as QualityError
     from usdhand.errors import TerminatedBuildError as TerminatedBuildError
+    from usdhand.errors import UnforeseenError as UnforeseenError
     from usdhand.errors import UsageError as UsageError
     from usdhand.errors import UsdHandError as UsdHandError
     from usdhand.evaluate.agreement import Agreement as Agreement
@@ -122,8 +124,8 @@ _HOME = {  # module -> its public names
     "usdhand.anatomy.frames": "HandFrames",
     "usdhand.anatomy.hand": "CharacterMap HandMap Side",
     "usdhand.errors": (
-        "CancelledError HandNotFoundError InputError InterruptedBuildError OutputError "
-        "QualityError TerminatedBuildError UsageError UsdHandError"
+        "CancelledError CrashedError HandNotFoundError InputError InterruptedBuildError "
+        "OutputError QualityError TerminatedBuildError UnforeseenError UsageError UsdHandError"
     ),
     "usdhand.evaluate.agreement": "Agreement label_agreement",
     "usdhand.evaluate.compare": "Comparison",

@@ -19,6 +19,7 @@ from usdhand.inputs import why_no_file
 from usdhand.problems import CHOICES, listed
 
 MAGIC = b"glTF"
+LONG_NAME = 200  # characters
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 LARGEST = 1e9  # metres and scales beyond are damage, and would overflow in products
 
@@ -183,7 +184,8 @@ class Document:
         path = self.path.parent / name
         try:
             if why := why_no_file(path):
-                raise InputError(f"{self.path}: its buffer file {path} is missing ({why}).")
+                shown = path if len(name) < LONG_NAME else _quoted(name)
+                raise InputError(f"{self.path}: its buffer file {shown} is missing ({why}).")
             with path.open("rb") as file:
                 return file.read(min(size, path.stat().st_size))
         except (OSError, ValueError, OverflowError) as error:
