@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from builders.crashing import crashing, short_clip
 from builders.in_memory import in_memory, sample
 
 import usdhand
-from usdhand.errors import CrashedError, InputError, UnforeseenError, UsageError
+from usdhand.errors import CancelledError, CrashedError, InputError, UnforeseenError, UsageError
 from usdhand.requests.convert import ConvertRequest
 from usdhand.verbs.run import run
 from usdhand.workers import each_apart
@@ -159,6 +160,18 @@ def test_workers_end_when_nobody_wants_more(tmp_path: Path) -> None:
     pids = [wait_for(Path(item)) for item in items]
     results.close()
     assert all(ended(pid) for pid in pids)
+
+
+def test_whoever_watches_stops_workers_too(tmp_path: Path) -> None:
+    for name in ("a.bvh", "b.bvh", "c.bvh"):
+        usdhand.write_new(short_clip(), tmp_path / name)
+    files = tuple(str(tmp_path / name) for name in ("a.bvh", "b.bvh", "c.bvh"))
+    request = ConvertRequest(files=files, out_dir=tmp_path / "out", to="bvh")
+    before = threading.active_count()
+    with pytest.raises(CancelledError) as stopped:
+        run(request, watch=lambda *_: False)
+    assert threading.active_count() == before, "no worker is left behind the error"
+    assert stopped.value.exit_code == 130
 
 
 def sleeping(item: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -66,7 +66,11 @@ class Journal:
     def each(self, items: Sequence[T] | Iterable[T], doing: str, total: int = -1) -> Iterator[T]:
         """Yield items, and tell how far it is."""
         count = total if total >= 0 else len(items)  # type: ignore[arg-type]
-        return each(items, count, self.progress(doing))
+        try:
+            yield from each(items, count, self.progress(doing))
+        finally:
+            if isinstance(items, Generator):  # processes behind it end now
+                items.close()
 
     def progress(self, doing: str) -> Callable[[int, int], object] | None:
         """What to tell how far ``doing`` is; None where nobody watches."""
