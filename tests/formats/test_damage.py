@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +13,11 @@ import numpy as np
 import pytest
 from builders.cli_runner import edit, run
 from builders.in_memory import in_memory, sample
+from click.testing import CliRunner
 from pxr import Sdf, Usd, UsdGeom
 
 import usdhand
+from usdhand.cli.main import main
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.usd.damage import damage_refused, first_line
 from usdhand.inputs import read_json, why_no_file
@@ -271,3 +274,22 @@ def test_compressed_files_in_packages_are_refused(tmp_path: Path) -> None:
                 target.writestr(info.filename, source.read(info), kind)
         said = run("convert", odd, "-o", tmp_path / "out.usda", "--force", code=code).stderr
         assert "compressed" in said or not code
+
+
+def test_a_knuckle_on_the_wrist_gives_no_fingers_without_a_word(tmp_path: Path) -> None:
+    whole = clip()
+    skeleton = whole.skeleton
+    knuckle = skeleton.names.index("LeftHandIndex1")
+    moved, rest, bind = whole.translations.copy(), skeleton.rest.copy(), skeleton.bind.copy()
+    moved[:, knuckle] = rest[knuckle, :3, 3] = 0.0
+    away = bind[skeleton.parents[knuckle], :3, 3] - bind[knuckle, :3, 3]
+    for joint in (knuckle, *skeleton.descendants(knuckle)):
+        bind[joint, :3, 3] += away
+    flat = replace(skeleton, rest=rest, bind=bind)
+    source = tmp_path / "flat.bvh"
+    usdhand.write_new(replace(whole, skeleton=flat, translations=moved), source)
+    out = tmp_path / "out.usda"
+    for arguments in (("convert", source, "--onto", OK), ("convert", OK, "--onto", source)):
+        done = CliRunner().invoke(main, [*map(str, arguments), "-o", str(out), "--force"])
+        assert done.exit_code in (0, 3, 4), done.output
+        assert done.exit_code or not re.search(r"\bnan\b|\binf\b", out.read_text())
