@@ -33,9 +33,10 @@ def check_clip(clip: Clip, file: str | Path, what: str = "") -> None:
     skeleton, of = clip.skeleton, f" of {what}" if what else ""
 
     def refuse(joint: int, has: str) -> None:
+        why = "one of the values that are not numbers" if "nan" in has else "which is not plausible"
         raise InputError(
-            f"{file}: joint {skeleton.joints[joint]}{of} {has}, which is not plausible. Check the "
-            "units and transforms above the skeleton."
+            f"{file}: joint {skeleton.joints[joint]}{of} {has}, {why}. Check the units and "
+            "transforms above the skeleton."
         )
 
     for name, pose in (("bind", skeleton.bind), ("rest", skeleton.rest)):
