@@ -11,13 +11,16 @@ import pytest
 from builders import stages
 from builders.cli_runner import run
 from builders.rewriting import HAND, payload, plain, rewrite
-from pxr import Usd
+from conftest import REPOSITORY
+from pxr import Usd, UsdSkel
 
 from usdhand.errors import OutputError
 from usdhand.formats.usd import write
 from usdhand.formats.usd.read import clip_from_character, read_clip
 from usdhand.formats.usd.stage import find_character
 from usdhand.formats.usd.write import write_motion
+
+TALK = REPOSITORY / "samples" / "conversations" / "talk_01_full.usdc"
 
 
 def refused(path: Path, output: Path, match: str, **options: object) -> None:
@@ -166,3 +169,17 @@ def test_an_output_that_would_lose_its_input_is_refused(
 ) -> None:
     monkeypatch.setattr(write, "_relative", lambda *_: "./elsewhere.usdc")
     refused(plain(tmp_path), tmp_path / "out.usdc", "elsewhere.usdc cannot be found")
+
+
+@pytest.mark.parametrize("suffix", ["usda", "usdz"])
+def test_a_default_prim_of_any_depth_is_kept(suffix: str, tmp_path: Path) -> None:
+    path = stages.referencing(tmp_path / "in.usda", TALK, prim="/World/Hero")
+    stage = stages.edited(path)
+    stage.GetRootLayer().defaultPrim = "/World/Hero"
+    stage.Save()
+    for verb in ("reduce", "convert"):
+        target = tmp_path / f"{verb}.{suffix}"
+        run(verb, path, "-o", target)
+        shot = Usd.Stage.CreateInMemory()
+        shot.DefinePrim("/Shot").GetReferences().AddReference(str(target))
+        assert any(prim.IsA(UsdSkel.Skeleton) for prim in shot.Traverse())

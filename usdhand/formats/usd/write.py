@@ -303,8 +303,6 @@ def layer_over(stage: Usd.Stage) -> Sdf.Layer:
     for field in ("upAxis", "metersPerUnit", "kilogramsPerUnit"):
         if stage.HasAuthoredMetadata(field):
             layer.pseudoRoot.SetInfo(field, stage.GetMetadata(field))
-    if stage.GetDefaultPrim():
-        layer.defaultPrim = stage.GetDefaultPrim().GetName()
     layer.subLayerPaths.append(source.realPath)
     return layer
 
