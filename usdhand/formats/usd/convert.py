@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Sdf, Usd, UsdSkel, Vt
 
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
@@ -16,6 +16,7 @@ from usdhand.formats.usd.bindings import apply_api, bind_animation
 from usdhand.formats.usd.character import character_of, gf_matrices, legal_clip
 from usdhand.formats.usd.damage import refuses_damage
 from usdhand.formats.usd.names import ALIASES, ORIGINALS, author_names, legal_skeleton
+from usdhand.formats.usd.placement import turn_and_scale
 from usdhand.formats.usd.poses import AuthoredPoses, authored_poses
 from usdhand.formats.usd.stage import Character, bound_animation, compose, find_skeletons
 from usdhand.formats.usd.world import world_above
@@ -63,8 +64,7 @@ class StageEdit:
 def placed(character: Character, placement: StageEdit) -> Character:
     """Return a character on a stage in memory that shows its own stage with another placement.
 
-    Scale and up axis are transforms on the root prims, so that meshes, cameras and lights go with
-    the skeleton.
+    Scale and up axis are transforms of all that is on the stage; see `turn_and_scale`.
     """
     source = character.stage
     layer = layer_over(source)
@@ -77,7 +77,7 @@ def placed(character: Character, placement: StageEdit) -> Character:
             moved = recounted_code(source.GetMetadata(field), old, new or old) + placement.offset
             layer.pseudoRoot.SetInfo(field, moved)
     stage = compose(layer)
-    _turn_and_scale(stage, placement)
+    turn_and_scale(stage, placement.up, placement.scale)
     skeleton = stage.GetPrimAtPath(character.skeleton.GetPath())
     return replace(character, stage=stage, skeleton=skeleton, animation=bound_animation(skeleton))
 
@@ -200,31 +200,6 @@ def _one_motion(path: Sdf.Path, name: str, selection: str) -> Problem:
         "rewritten"
     )
     return Problem("variants", message, str(path))
-
-
-def _turn_and_scale(stage: Usd.Stage, placement: StageEdit) -> None:
-    turn = 0.0
-    up = str(UsdGeom.GetStageUpAxis(stage))
-    if placement.up is not None and placement.up != up:
-        turn = 90.0 if placement.up == "Z" else -90.0
-        UsdGeom.SetStageUpAxis(stage, placement.up)
-    if turn == 0.0 and placement.scale == 1.0:
-        return
-    for prim in stage.GetPseudoRoot().GetChildren():
-        xformable = UsdGeom.Xformable(prim)
-        if not xformable:
-            continue
-        order = xformable.GetXformOpOrderAttr().Get() or Vt.TokenArray()
-        own = []
-        if turn:
-            op = xformable.AddRotateXOp(UsdGeom.XformOp.PrecisionDouble, "usdhandUpAxis")
-            op.Set(turn)
-            own.append(op.GetOpName())
-        if placement.scale != 1.0:
-            op = xformable.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "usdhandScale")
-            op.Set(Gf.Vec3d(placement.scale))
-            own.append(op.GetOpName())
-        xformable.GetXformOpOrderAttr().Set(Vt.TokenArray([*own, *order]))
 
 
 def _author_motion(
