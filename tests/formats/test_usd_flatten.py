@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,13 @@ import pytest
 from builders import stages
 from builders.cli_runner import run
 from conftest import REPOSITORY
+from oracles.composition import assert_composes_alike
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel
 
 from usdhand.formats.usd.check import check_file
+from usdhand.formats.usd.composed import variant_places
 from usdhand.formats.usd.convert import StageEdit, motion_variants, placed, write_placed
-from usdhand.formats.usd.flatten import flat_layer, variant_places
+from usdhand.formats.usd.flatten import flat_layer
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.stage import find_character
 
@@ -160,6 +163,57 @@ def assert_same_in_all_variants(a: Usd.Stage, b: Usd.Stage) -> None:
             stage.SetEditTarget(stage.GetSessionLayer())
             stage.GetPrimAtPath(path).GetVariantSets().SetSelection(name, variant)
         assert composed(a) == composed(b), (path, name, variant)
+
+
+@pytest.mark.parametrize("rate", [None, 24.0, 60.0])
+@pytest.mark.parametrize("how", ["reference", "payload"])
+def test_what_a_sublayer_of_another_rate_refers_to_keeps_its_time(
+    how: str, rate: float | None, tmp_path: Path
+) -> None:
+    asset = with_looks(stages.character(tmp_path / "asset.usda", rate=48.0))
+    layout = stages.referencing(
+        tmp_path / "layout.usda", asset, how=how, rate=30.0, offset=Sdf.LayerOffset(2.0)
+    )
+    path = stages.sublayering(tmp_path / "in.usda", layout, rate=rate, offset=Sdf.LayerOffset(1.0))
+    target = tmp_path / "out.usdc"
+    run("convert", path, "-o", target)
+    before, after = (Usd.Stage.Open(str(p)) for p in (path, target))
+    assert_composes_alike(before, after)
+    assert_same_in_all_variants(before, after)
+
+
+def test_long_chains_of_files_are_no_recursion(tmp_path: Path) -> None:
+    path = local(tmp_path)
+    for number in range(400):
+        path = stages.referencing(tmp_path / f"{number}.usda", path)
+    stage = Usd.Stage.Open(str(path))
+    depth = sys.getrecursionlimit()
+    sys.setrecursionlimit(250)
+    try:
+        flat, lost = flat_layer(stage)
+    finally:
+        sys.setrecursionlimit(depth)
+    assert not lost
+    assert_composes_alike(stage, Usd.Stage.Open(flat))
+
+
+def test_values_count_for_more_than_variants(tmp_path: Path) -> None:
+    """A class that a file between adds to has no equal in one file."""
+    asset = with_looks(stages.character(tmp_path / "asset.usda"))
+    middle = stages.referencing(tmp_path / "middle.usda", asset)
+    for path, value in ((asset, 1), (middle, 2)):
+        stage = stages.edited(path)
+        base = stage.CreateClassPrim("/_Base")
+        base.CreateAttribute("inherited", Sdf.ValueTypeNames.Int).Set(value)
+        if path == asset:
+            stage.GetPrimAtPath("/Hero/Skin").GetInherits().AddInherit("/_Base")
+        stage.Save()
+    stage = Usd.Stage.Open(str(stages.referencing(tmp_path / "in.usda", middle)))
+    flat, [lost] = flat_layer(stage)
+    assert lost.code == "variants"
+    assert "/Hero/Skin.inherited would not stay the same" in lost.message
+    assert Usd.Stage.Open(flat).GetAttributeAtPath("/Hero/Skin.inherited").Get() == 2
+    assert_composes_alike(stage, Usd.Stage.Open(flat))
 
 
 @pytest.mark.parametrize("source", SOURCES)
