@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -143,7 +144,8 @@ def _same(a: Any, b: Any, of_type: Sdf.ValueTypeName) -> bool:
 
 
 def _file(asset: Sdf.AssetPath) -> str:
-    return str(asset.resolvedPath or asset.path)
+    """A file that is found, else the last name of the path: how it leads there may differ."""
+    return str(asset.resolvedPath) or re.split(r"[/\[]", str(asset.path).rstrip("]"))[-1]
 
 
 def _holds_nan(value: Any) -> bool:
