@@ -162,16 +162,14 @@ def write_character(path: Path, rig: Rig, rest: Pose, parts: Sequence[Part], abo
     UsdGeom.Scope.Define(stage, base + "/Geometry")
     UsdGeom.Scope.Define(stage, base + "/Materials")
     materials: dict[tuple[float, ...], UsdShade.Material] = {}
-    corners = []
     for part in parts:
         mesh = _mesh(stage, f"{base}/Geometry/{part.name}", rig, part, order)
         key = (*part.color, part.roughness)
         if key not in materials:
             materials[key] = _material(stage, f"{base}/Materials/{part.name}", part)
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(materials[key])
-        corners.append(np.array(mesh.GetExtentAttr().Get()))
-    box = np.concatenate(corners)
-    root.CreateExtentAttr(_vec3f(np.stack([box.min(axis=0), box.max(axis=0)])))
+    box = UsdGeom.Boundable.ComputeExtentFromPlugins(root, Usd.TimeCode.Default())
+    root.CreateExtentAttr(box)
     save(layer, path)
 
 
@@ -230,6 +228,17 @@ def write_clip(
             if len(motion.shifts) > 1:
                 layer.SetTimeSample(shifts.path, time, _vec3f(motion.shifts[i]))
     save(layer, path)
+    _add_extents(path, base, len(motion.turns), rig.start)
+
+
+def _add_extents(path: Path, root: str, count: int, start: float) -> None:
+    """Say how far a character reaches at each time, once its file can be found."""
+    stage = Usd.Stage.Open(str(path))
+    boundable = UsdGeom.Boundable(stage.GetPrimAtPath(root))
+    for time in (start + i for i in range(count)):
+        box = UsdGeom.Boundable.ComputeExtentFromPlugins(boundable, time)
+        boundable.CreateExtentAttr().Set(box, time)
+    save(stage.GetRootLayer(), path)
 
 
 def finger_joints(rig: Rig, side: str | None = None) -> list[str]:

@@ -15,6 +15,7 @@ from usdhand.formats.usd.animation import animation_losses, author_animation
 from usdhand.formats.usd.bindings import apply_api, bind_animation
 from usdhand.formats.usd.character import character_of, gf_matrices, legal_clip
 from usdhand.formats.usd.damage import refuses_damage
+from usdhand.formats.usd.extents import author_extents
 from usdhand.formats.usd.names import ALIASES, ORIGINALS, author_names, legal_skeleton
 from usdhand.formats.usd.placement import turn_and_scale
 from usdhand.formats.usd.poses import AuthoredPoses, authored_poses
@@ -127,6 +128,7 @@ def write_placed(
         variants = motion_variants(character)
         with Sdf.ChangeBlock():
             path, shared = _author_motion(layer, character, clip, changed, variants)
+        author_extents(layer, character.root.GetPath())
         lost = (
             *shared,
             *(_one_motion(*place) for place in variants),

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, Vt
+from pxr import Kind, Sdf, Tf, Usd, Vt
 
 from usdhand.anatomy import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError, UsageError, UsdHandError
@@ -73,7 +73,9 @@ def write_library(library: MotionLibrary, output: str | Path, *, force: bool = F
                 "segmentation:smoothing": (_TYPES.Double, segmentation.smoothing),
             },
         )
-        _prim(layer, CLIPS, "Scope")
+        clips = _prim(layer, CLIPS, "Scope")
+        for group in (root, clips):  # a character is a component: all above it are groups
+            group.kind = Kind.Tokens.group
         for clip, prim_name in zip(library.clips, _prim_names(library), strict=True):
             _write_clip(layer, clip, prim_name)
         if library.left_out:
@@ -210,6 +212,7 @@ def _write_clip(layer: Sdf.Layer, clip: LibraryClip, name: str) -> None:
         },
     )
     if Path(clip.path).suffix.lower() in USD_SUFFIXES:
+        prim.kind = Kind.Tokens.group
         motion = _prim(layer, f"{prim.path}/Motion", "")
         first = Sdf.Path(clip.skel).GetPrefixes()[0] if clip.skel else Sdf.Path.emptyPath
         motion.payloadList.prependedItems = [Sdf.Payload(clip.path, first)]
