@@ -115,8 +115,8 @@ def test_conventions_are_tables_or_files(tmp_path: Path) -> None:
 
 
 def test_tables_may_hold_tuples_and_later_ones_win() -> None:
-    first = {"studio": {"wrist": "a", "finger": ("b", "c", "d")}}
-    second = {"studio": {"wrist": ("e", "f"), "finger": ["b", "c", "d"]}}
+    first = {"studio": {"wrist": "a", "finger": ("b{digit}", "c{digit}", "d{digit}")}}
+    second = {"studio": {"wrist": ("e", "f"), "finger": ["b{digit}", "c{digit}", "d{digit}"]}}
     found = usdhand.load_conventions(first, second).conventions[0]
     assert (found.name, found.own) == ("studio", True)
     assert found.hands[None]["wrist"] == ("e", "f")

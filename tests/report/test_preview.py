@@ -129,7 +129,7 @@ def test_json_tells_what_was_made(tmp_path: Path) -> None:
         (["ok.html", "--with-report", "half.json"], 3, "not complete"),
         (["ok.html", "--with-report", "gone.json"], 3, "cannot be read"),
         (["ok.html", "--figure", "list.json"], 3, "not a figure"),
-        (["ok.html", "--figure", "gone.svg"], 3, "cannot be read"),
+        (["ok.html", "--figure", "gone.svg"], 3, "no such file"),
         (["ok.html", "--skel", "Nobody"], 2, "Nobody"),
     ],
 )

@@ -25,7 +25,7 @@ from usdhand.splice.settings import Pin
 
 CLASSES = [request_class(verb) for verb in VERBS]
 # Settings that refuse other numbers.
-WITHIN = {"factor": (1.0, 2.0), "shortest": (0.1, 0.3), "longest": (0.7, 2.0)}
+WITHIN = {"fps": (24.0, 60.0), "factor": (1.0, 2.0), "shortest": (0.1, 0.3), "longest": (0.7, 2.0)}
 
 
 def values(kind: Any) -> st.SearchStrategy[Any]:

@@ -140,8 +140,18 @@ def test_one_unknown_hand(side: Side) -> None:
 def test_words_tell_the_side_of_unknown_names() -> None:
     named = {j: f"{n}_{j[0] or 'c'}" for j, n in nonsense().items()}
     skeleton, expected = build(named)
+    found = map_character(skeleton)
+    same_joints(found, expected)
+    assert "left and right by names and the feet" in " ".join(found.evidence)
+
+
+def test_words_do_not_tell_the_side_of_a_mirrored_body() -> None:
+    named = {j: f"{n}_{j[0] or 'c'}" for j, n in nonsense().items()}
+    skeleton, expected = build(named)
     mirrored = from_points(list(skeleton.joints), skeleton.bind_positions * [-1, 1, 1])
-    same_joints(map_character(mirrored), expected)
+    found = map_character(mirrored)
+    assert found.hands["left"].wrist == expected["right", "wrist"]
+    assert "left and right by the feet" in found.contradictions[0]
 
 
 def test_three_fingers_of_unknown_names() -> None:

@@ -113,7 +113,8 @@ def _hands_by_shape(rig: NamedJoints, conventions: Conventions) -> CharacterMap:
     named = how == BY_WORDS
     evidence += [] if named else [f"left and right by {how}"]
     found_map = CharacterMap(hands, "geometry", notes=tuple(notes), evidence=tuple(evidence))
-    return judged_sides(rig, found_map) if named and not conventions.explicit else found_map
+    by_file = conventions.explicit or any(rig.skeleton.aliases)
+    return judged_sides(rig, found_map) if named and not by_file else found_map
 
 
 def _pair(rig: NamedJoints, found: Sequence[FoundHand], notes: list[str]) -> Sequence[FoundHand]:

@@ -50,10 +50,10 @@ def why_nothing_is_bound(skeleton: Usd.Prim) -> str:
     if not targets:
         return f"no animation is bound to {path}. Bind a SkelAnimation with skel:animationSource."
     bound = skeleton.GetStage().GetPrimAtPath(targets[0])
-    fault = "is no SkelAnimation" if bound else "does not exist"
+    fault = "is not a SkelAnimation" if bound else "does not exist"
     return (
-        f"{owner.GetPath()} binds {targets[0]} to {path}, which {fault}. Bind a SkelAnimation "
-        "with skel:animationSource."
+        f"no animation is bound to {path}: {targets[0]}, which {owner.GetPath()} names, {fault}. "
+        "Bind a SkelAnimation with skel:animationSource."
     )
 
 

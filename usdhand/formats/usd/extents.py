@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
-from usdhand.formats.usd.stage import compose, usd_diagnostics
+from usdhand.formats.usd.damage import usd_diagnostics
+from usdhand.formats.usd.stage import compose
 
 
 def author_extents(layer: Sdf.Layer, path: Sdf.Path) -> None:
