@@ -53,7 +53,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 # Verb and arguments, {made} being the folder above -> openings of inputs, and in memory: extents
-# are those of the composed result. expand looks at the clip of the rig, which may have changed.
+# are those of the composed result. expand looks at the body of the rig and
+# of its clip, which may have changed.
 ONCE: dict[str, tuple[tuple[object, ...], tuple[Path | str, ...], int]] = {
     "inspect": (("inspect", TALK), (TALK,), 0),
     "check": (("check", TALK), (TALK,), 0),
@@ -64,7 +65,9 @@ ONCE: dict[str, tuple[tuple[object, ...], tuple[Path | str, ...], int]] = {
     ),
     "reduce into one file": (("reduce", TALK, "-o", "{out}.usda", "--flatten"), (TALK,), 2),
     "reduce into a package": (("reduce", TALK, "-o", "{out}.usdz"), (TALK,), 2),
-    "expand": (("expand", "{made}/rig.usda", "-o", "{out}.usda"), ("rig.usda", TALK), 1),
+    "expand": (
+        ("expand", "{made}/rig.usda", "-o", "{out}.usda"), ("rig.usda", "rig.usda", TALK), 1
+    ),
     "expand onto": (
         ("expand", "{made}/rig.usda", "--onto", BEN, "-o", "{out}.usda"), ("rig.usda", BEN), 1
     ),

@@ -202,7 +202,7 @@ def test_a_missing_schema_is_said(tmp_path: Path, place: str) -> None:
 
 @pytest.mark.parametrize(
     ("target", "words"),
-    [("/Hero/None", "which /Hero/Skel names, does not exist"), ("/Hero", "which /Hero/Skel names, is not a SkelAnimation")],
+    [("/Hero/None", "names, does not exist"), ("/Hero", "names, is not a SkelAnimation")],
 )
 def test_a_binding_that_leads_nowhere_is_said(tmp_path: Path, target: str, words: str) -> None:
     path = changed(
