@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.motion.rotations import Array
+from usdhand.reduce.moments import Moments
 from usdhand.reduce.rig import Relation
 from usdhand.reduce.settings import Fit, Thresholds
 
@@ -42,12 +43,15 @@ class Statistics:
     @classmethod
     def of(cls, curves: Array) -> Statistics:
         """Statistics over the population (``ddof=0``) of curves (frames, n) in degrees."""
-        mean = curves.mean(axis=0)
-        centred = curves - mean
-        std = np.sqrt(np.mean(centred**2, axis=0))
-        standard = centred / np.where(std > 0, std, 1.0)
-        correlation = np.clip(standard.T @ standard / len(curves), -1.0, 1.0)
-        return cls(mean, std, np.ptp(curves, axis=0), correlation)
+        return cls.from_moments(Moments.of(curves))
+
+    @classmethod
+    def from_moments(cls, moments: Moments) -> Statistics:
+        """Statistics of curves whose moments are known."""
+        std = moments.std
+        scale = np.where(std > 0, std, 1.0)
+        correlation = np.clip(moments.covariance / np.outer(scale, scale), -1.0, 1.0)
+        return cls(moments.mean, std, moments.high - moments.low, correlation)
 
     @cached_property
     def distance(self) -> Array:
@@ -128,9 +132,9 @@ def fit_relations(
     def relation(a: int) -> Relation:
         name, mean, std = names[a], float(statistics.mean[a]), float(statistics.std[a])
         if not moving[a]:
-            return Relation(name, "constant", offset=mean, rms_error=std)
+            return Relation(name, "constant", offset=mean, rms_error=std, std=std)
         if root[a] < 0:
-            return Relation(name, "free")
+            return Relation(name, "free", std=std)
         chosen = [int(root[a])]
         if most_controllers > 1:
             chosen = _chosen_controllers(statistics, a, chosen[0], free, most_controllers)
@@ -143,6 +147,7 @@ def fit_relations(
             slopes=tuple(float(s) for s in slopes),
             rmsd=float(statistics.distance[a, root[a]]),
             rms_error=error,
+            std=std,
         )
 
     return tuple(relation(a) for a in range(len(names)))

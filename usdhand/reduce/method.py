@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.display import displayed
-from usdhand.errors import InputError, UsageError
+from usdhand.errors import UsageError
 from usdhand.motion import Clip
+from usdhand.reduce.choose import choose, relations_of
 from usdhand.reduce.errors import Errors, distances_mm, measure_errors
+from usdhand.reduce.evidence import Evidence, gather
 from usdhand.reduce.fit import Statistics, fit_relations
-from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.limits import Limits
+from usdhand.reduce.moments import Moments
+from usdhand.reduce.rig import ReducedRig, Relation, relation_matrix
 from usdhand.reduce.search import thresholds_for_count, thresholds_for_error
-from usdhand.reduce.settings import Fit, Target, Thresholds
+from usdhand.reduce.settings import Choice, Fit, Target, Thresholds
+from usdhand.reduce.variation import Residuals
 
 
 @displayed(
@@ -40,6 +43,7 @@ class Reduction:
     errors : of the modelled channels against the model (what reduction loses)
     model_errors : of all 45 channels a hand when only 25 move (what the model loses)
     total_errors : of all channels against the source
+    evidence : what the rig was fitted to; None where a fitted one was applied
     """
 
     clip: Clip
@@ -51,6 +55,7 @@ class Reduction:
     errors: Errors
     model_errors: Errors
     total_errors: Errors
+    evidence: Evidence | None = None
 
     @property
     def motion(self) -> Clip:
@@ -63,10 +68,11 @@ def fit_rig(
     hands: Sequence[Hands],
     target: Target,
     fit: Fit = "paper",
-    most_controllers: int = 1,
+    most_controllers: int | None = None,
     sources: Sequence[Channels] | None = None,
+    choice: Choice | None = None,
 ) -> ReducedRig:
-    """Fit one rig to all clips together (Joerg & O'Sullivan 2009).
+    """Fit one rig to all clips together; see `fit_to`.
 
     Parameters
     ----------
@@ -78,34 +84,60 @@ def fit_rig(
         if a clip has fewer than two frames, or the clips' hands have different joints.
     UsageError
         if settings contradict each other.
+    QualityError
+        if the largest error that is asked for is not above 0.
     """
-    if most_controllers > 1 and fit == "paper":
-        raise UsageError("Several controllers per channel need the least-squares fit.")
-    for clip in clips:
-        if len(clip) < 2:
-            raise InputError(
-                f"{clip.origin.path or clip.name} has only one frame, which shows no motion."
-            )
-    names = hands[0].model_names
-    for clip, other in zip(clips, hands, strict=True):
-        if other.model_names != names:
-            raise InputError(
-                f"{clip.origin.path or clip.name} has other hand joints than {clips[0].name}: fit "
-                "them apart."
-            )
     encoded = sources or [h.encode(c) for c, h in zip(clips, hands, strict=True)]
-    modelled = np.concatenate([e.select(names).values.T for e in encoded], axis=1).T
-    statistics = Statistics.of(modelled)
-    thresholds = _thresholds(statistics, target, fit)
-    others = tuple(n for n in hands[0].all_names if n not in set(names))
-    held = sum(e.select(others).values.sum(axis=0) for e in encoded) / len(modelled)
+    evidence = gather(zip(clips, hands, encoded, strict=True))
+    return fit_to(evidence, target, fit, most_controllers, choice)
+
+
+def fit_to(
+    evidence: Evidence,
+    target: Target,
+    fit: Fit = "paper",
+    most_controllers: int | None = None,
+    choice: Choice | None = None,
+) -> ReducedRig:
+    """Fit a rig: by the rules of Joerg & O'Sullivan 2009, or with the best channels.
+
+    Thresholds are the paper's rules. A number of channels or a largest error is met with the best
+    channels, or with thresholds that are searched for it where ``fit`` is "paper".
+
+    Parameters
+    ----------
+    most_controllers : how many channels a channel may follow; None for one by the paper's rules,
+        else as many as serve takes left out
+    choice : what counts where the best channels are chosen
+
+    Raises
+    ------
+    UsageError, QualityError
+        as `fit_rig`.
+    """
+    if (most_controllers or 1) > 1 and fit == "paper":
+        raise UsageError("Several controllers per channel need the least-squares fit.")
+    names, moments, choice = evidence.names, evidence.moments, choice or Choice()
+    thresholds, measure = Thresholds(0.0, 0.0), ""
+    if target.thresholds is None and fit == "least-squares":
+        model = choose(evidence, target, most_controllers, choice)
+        relations, measure = relations_of(evidence, model), choice.measure
+    else:
+        statistics = Statistics.from_moments(moments)
+        thresholds = _thresholds(statistics, target, fit)
+        fitted = fit_relations(names, statistics, thresholds, fit, most_controllers or 1)
+        relations = _with_limits(fitted, moments)
+    dependent = [i for i, r in enumerate(relations) if r.kind != "free"]
+    residuals = Residuals.of(names, relation_matrix(relations), dependent, evidence.bands)
     return ReducedRig(
-        fit_relations(names, statistics, thresholds, fit, most_controllers),
-        dict(zip(others, (float(v) for v in held), strict=True)),
+        relations,
+        evidence.held,
         thresholds.range,
         thresholds.rmsd,
         fit,
-        tuple(clip.name for clip in clips),
+        evidence.sources,
+        measure,
+        residuals,
     )
 
 
@@ -130,7 +162,7 @@ def apply_rig(
             f"The rig has the channel '{missing[0]}' that the hands of {clip.name} do not have "
             f"({len(missing)} such channels)."
         )
-    free = source.select(rig.free)
+    free = rig.on_turn(source.select(rig.free))
     # Channels of this hand that the rig knows nothing of keep their motion.
     reduced = source.replaced(rig.evaluate(free))
     model = reduced.replaced(source.select(rig.names))
@@ -171,3 +203,25 @@ def _thresholds(statistics: Statistics, target: Target, fit: Fit) -> Thresholds:
         return thresholds_for_count(statistics, target.free_channels, fit)
     assert target.max_error is not None
     return thresholds_for_error(statistics, target.max_error, fit)
+
+
+def _with_limits(relations: Sequence[Relation], moments: Moments) -> tuple[Relation, ...]:
+    """Relations of the paper's rules with limits that change nothing on what they were fitted to.
+
+    The soft ends of a channel that follows one other take in all that it does there.
+    """
+    spans = {
+        r.name: (float(low), float(high))
+        for r, low, high in zip(relations, moments.low, moments.high, strict=True)
+    }
+
+    def limited(relation: Relation) -> Relation:
+        if relation.kind == "constant":
+            return relation
+        ends = list(spans[relation.name])
+        if len(relation.controllers) == 1:
+            [slope] = relation.slopes
+            ends += [relation.offset + slope * e for e in spans[relation.controllers[0]]]
+        return replace(relation, limits=Limits.of(relation.name, min(ends), max(ends)))
+
+    return tuple(limited(relation) for relation in relations)

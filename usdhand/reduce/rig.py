@@ -12,6 +12,9 @@ from usdhand.anatomy.channels import Channels
 from usdhand.display import displayed
 from usdhand.errors import InputError
 from usdhand.motion.rotations import Array
+from usdhand.reduce.limits import Limits
+from usdhand.reduce.turns import whole_turns
+from usdhand.reduce.variation import Residuals
 
 Kind = Literal["free", "constant", "linear"]
 
@@ -30,6 +33,9 @@ class Relation:
         linear channels of one controller; it may exceed the threshold where a chain of
         controllers was followed to its root
     rms_error : degrees, on the motion that the rig was fitted to
+    left_out_error : the same on takes left out of the fit; None where there was one take
+    std : standard deviation on the motion that the rig was fitted to, degrees; None if not known
+    limits : of a free channel where an animator should move it, of a linear one where it stays
     """
 
     name: str
@@ -39,6 +45,16 @@ class Relation:
     slopes: tuple[float, ...] = ()
     rmsd: float | None = None
     rms_error: float = 0.0
+    left_out_error: float | None = None
+    std: float | None = None
+    limits: Limits | None = None
+
+    @property
+    def told(self) -> float | None:
+        """Share of its variance that the rig tells, 0 to 1, on the motion it was fitted to."""
+        if self.std is None or self.kind == "free":
+            return None
+        return max(0.0, 1.0 - (self.rms_error / self.std) ** 2) if self.std > 0 else 1.0
 
 
 @displayed(
@@ -48,6 +64,7 @@ class Relation:
         "range_threshold": rig.range_threshold,
         "rmsd_threshold": rig.rmsd_threshold,
         "fit": rig.fit,
+        "measure": rig.measure,
         "sources": rig.sources,
     }
 )
@@ -62,6 +79,8 @@ class ReducedRig:
     range_threshold, rmsd_threshold : what the rig was fitted with (degrees; standardised)
     fit : "paper" or "least-squares"
     sources : names of the clips it was fitted to
+    measure : "deg" or "mm": what the free channels were chosen by; "" where the paper's rules chose
+    residuals : the motion that it does not keep; None if not known
     """
 
     relations: tuple[Relation, ...]
@@ -70,6 +89,8 @@ class ReducedRig:
     rmsd_threshold: float = 0.0
     fit: str = "paper"
     sources: tuple[str, ...] = ()
+    measure: str = ""
+    residuals: Residuals | None = field(default=None, compare=False)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -81,8 +102,22 @@ class ReducedRig:
         """Channels that have curves of their own."""
         return tuple(r.name for r in self.relations if r.kind == "free")
 
-    def evaluate(self, free: Channels) -> Channels:
+    def on_turn(self, free: Channels) -> Channels:
+        """Curves of free channels less the whole turns that lead away from their limits."""
+        middles = {r.name: r.limits.middle for r in self.relations if r.limits is not None}
+        means = free.values.mean(axis=0) if len(free.values) else np.zeros(len(free))
+        away = [m - middles.get(name, m) for name, m in zip(free.names, means, strict=True)]
+        turns = whole_turns(free.names, np.array(away))
+        if not turns.any():
+            return free
+        return Channels(free.names, (free.values.T - 360.0 * turns[:, None]).T)
+
+    def evaluate(self, free: Channels, added: Channels | None = None) -> Channels:
         """All channels, held ones included, from the curves of the free ones.
+
+        Parameters
+        ----------
+        added : curves in degrees to add to channels that are not free, within their limits
 
         Raises
         ------
@@ -93,11 +128,16 @@ class ReducedRig:
         """
         curves = dict(zip(self.free, free.select(self.free).values.T, strict=True))
         frames = len(free.values)
+        more = {} if added is None else dict(zip(added.names, added.values.T, strict=True))
         for relation in evaluation_order(self.relations):
             if relation.kind != "free":
                 value = np.full(frames, relation.offset)
                 for controller, slope in zip(relation.controllers, relation.slopes, strict=True):
                     value += slope * curves[controller]
+                if relation.name in more:
+                    value += more[relation.name]
+                if relation.limits is not None and relation.kind == "linear":
+                    value = relation.limits.soften(value)
                 curves[relation.name] = value
         held = {name: np.full(frames, value) for name, value in self.held.items()}
         values = [*(curves[name] for name in self.names), *held.values()]
@@ -133,6 +173,18 @@ def evaluation_order(relations: Sequence[Relation]) -> tuple[Relation, ...]:
             elif controller not in done:
                 chain[controller] = iter(by_name[controller].controllers)
     return tuple(done.values())
+
+
+def relation_matrix(relations: Sequence[Relation]) -> Array:
+    """(n, n) matrix of relations that follow free channels only; see `usdhand.reduce.relate`."""
+    place = {r.name: i for i, r in enumerate(relations)}
+    told = np.zeros((len(relations), len(relations)))
+    for i, relation in enumerate(relations):
+        if relation.kind == "free":
+            told[i, i] = 1.0
+        for controller, slope in zip(relation.controllers, relation.slopes, strict=True):
+            told[i, place[controller]] = slope
+    return told
 
 
 def _columns(values: list[Array], frames: int) -> Array:

@@ -10,6 +10,8 @@ from usdhand.errors import UsageError
 from usdhand.options import check_choices, option
 
 Fit = Literal["paper", "least-squares"]
+MeasureName = Literal["deg", "mm"]
+Preference = Literal["flexion"]
 
 
 @dataclass(frozen=True)
@@ -43,19 +45,43 @@ class Target:
             raise UsageError("Give either thresholds, a number of channels, or a largest error.")
 
 
+@dataclass(frozen=True)
+class Choice:
+    """What counts where the free channels are chosen directly, as the best ones.
+
+    Attributes
+    ----------
+    measure : "deg": squared degrees of all channels; "mm": squared millimetres of the fingertips
+    keep : channels that stay free in any case
+    prefer : "flexion": twists and spreads must be worth more than a flexion
+    symmetric : the same channels of both hands
+    """
+
+    measure: MeasureName = "deg"
+    keep: tuple[str, ...] = ()
+    prefer: Preference | None = None
+    symmetric: bool = False
+
+
 @displayed()
 @dataclass(frozen=True)
 class ReduceSettings:
     """How a rig is fitted: one measure of its size; step 4 of the paper by default.
+
+    A number of channels or a largest error is met with the channels that tell the others best; by
+    the paper's rules, with thresholds searched for it, where ``fit`` is "paper".
 
     Attributes
     ----------
     preset : 1 to 4, the paper's steps
     range_deg, rmsd : own thresholds, in degrees and for standardised curves
     free_channels : how many channels stay free
-    max_error : largest RMS error of any channel, degrees
-    fit : "paper" keeps standard deviations, "least-squares" has the smallest error
-    controllers : how many channels a channel may follow, with least squares
+    max_error : largest RMS error of any channel, degrees (of any fingertip, mm)
+    fit : "paper" keeps standard deviations, "least-squares" has the smallest error; by default the
+        paper's for thresholds, least squares for a number of channels or a largest error
+    controllers : how many channels a channel may follow, with least squares; by default one for
+        thresholds, else as many as serve takes left out
+    measure, keep, prefer, symmetric : see `Choice`
     """
 
     preset: int | None = option(
@@ -78,17 +104,44 @@ class ReduceSettings:
         "Leave N channels free.", "--target-dofs", default=None, metavar="N", key="target_dofs"
     )
     max_error: float | None = option(
-        "Largest RMS error of any channel allowed.", default=None, metavar="DEG"
+        "Largest RMS error of any channel allowed (with --measure mm of any fingertip, in mm).",
+        default=None,
+        metavar="DEG",
     )
-    fit: Fit = option(
-        "Slopes that keep standard deviations, or slopes with the smallest error.", default="paper"
+    fit: Fit | None = option(
+        "Slopes that keep standard deviations (the paper's), or slopes with the smallest error. "
+        "[default: paper for presets and thresholds, else least-squares]",
+        default=None,
     )
-    controllers: int = option(
-        "How many channels a channel may follow (needs --fit least-squares).", default=1, at_least=1
+    controllers: int | None = option(
+        "How many channels a channel may follow (needs least squares). [default: 1 for presets "
+        "and thresholds, else what serves takes left out]",
+        default=None,
+        at_least=1,
     )
+    measure: MeasureName = option(
+        "What --target-dofs and --max-error make small: degrees of all channels, or millimetres "
+        "at the fingertips.",
+        default="deg",
+    )
+    keep: tuple[str, ...] = option(
+        "Channel that stays free in any case, for example riThumbCMCx; repeatable.",
+        default=(),
+        metavar="CHANNEL",
+    )
+    prefer: Preference | None = option(
+        "Twists and spreads are left free only where they are worth more than a flexion.",
+        default=None,
+    )
+    symmetric: bool = option("Leave the same channels of both hands free.", default=False)
 
     def __post_init__(self) -> None:
         check_choices(self)
+
+    @property
+    def choice(self) -> Choice:
+        """What counts where the free channels are chosen directly."""
+        return Choice(self.measure, self.keep, self.prefer, self.symmetric)
 
     @property
     def target(self) -> Target:
@@ -117,4 +170,14 @@ class ReduceSettings:
             thresholds = PRESETS[preset]
         elif self.free_channels is None and self.max_error is None:
             thresholds = PRESETS[4]
-        return Target(thresholds, self.free_channels, self.max_error)
+        target = Target(thresholds, self.free_channels, self.max_error)
+        by_rules = thresholds is not None or self.fit == "paper"
+        if by_rules and self.choice != Choice():
+            raise UsageError(
+                "--measure, --keep, --prefer and --symmetric are for the channels that "
+                "--target-dofs and --max-error choose by least squares; the paper's rules have no "
+                "such choice."
+            )
+        if (self.controllers or 1) > 1 and by_rules and self.fit != "least-squares":
+            raise UsageError("Several controllers per channel need the least-squares fit.")
+        return target

@@ -7,18 +7,23 @@ from typing import Any
 
 import numpy as np
 
+from usdhand.reduce.curve import Loss, error_curve
 from usdhand.reduce.errors import Errors, pca_rms
+from usdhand.reduce.evidence import Evidence
 from usdhand.reduce.method import Reduction
-from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.rig import ReducedRig, Relation
+from usdhand.reduce.settings import ReduceSettings
 from usdhand.report.document import rounded
 from usdhand.report.text import problems_data, table, written_to
+
+SHOWN_COUNTS = (5, 10, 15, 20, 30)
 
 
 def reduce_result(reduction: Reduction) -> dict[str, Any]:
     """Everything `reduce` reports of one clip."""
     rig, errors = reduction.rig, reduction.errors
     curves = reduction.source.select(rig.names).values
-    over = [r.name for r in rig.relations if r.rmsd is not None and r.rmsd >= rig.rmsd_threshold]
+    over = followed_over(rig)
     return {
         "clip": reduction.clip.name,
         "free_channels": len(rig.free),
@@ -28,6 +33,7 @@ def reduce_result(reduction: Reduction) -> dict[str, Any]:
             "rmsd": rounded(rig.rmsd_threshold),
         },
         "fit": rig.fit,
+        "measure": rig.measure or None,
         "fitted_to": list(rig.sources),
         "channels": _channels_data(rig, errors, curves),
         "followed_to_root_over_threshold": over,
@@ -50,12 +56,64 @@ def reduce_result(reduction: Reduction) -> dict[str, Any]:
     }
 
 
+def curve_data(evidence: Evidence, settings: ReduceSettings) -> dict[str, Any]:
+    """Errors by number of channels, PCA's beside them, and the number at the knee."""
+    curve = error_curve(evidence, settings.choice, settings.controllers)
+
+    def loss(found: Loss | None) -> dict[str, float] | None:
+        return None if found is None else {"deg": rounded(found.deg), "mm": rounded(found.mm)}
+
+    return {
+        "measure": settings.measure,
+        "points": [
+            {
+                "channels": point.channels,
+                "fitted": loss(point.fitted),
+                "left_out": loss(point.left_out),
+                "pca": loss(point.pca),
+                "pca_left_out": loss(point.pca_left_out),
+            }
+            for point in curve.points
+        ],
+        "presets": [
+            {"preset": preset, "channels": count, "fitted": loss(found)}
+            for preset, (count, found) in curve.presets.items()
+        ],
+        "suggested_channels": curve.suggested,
+    }
+
+
+def fitted_data(relation: Relation) -> dict[str, Any]:
+    """How well a channel was told on the motion that its rig was fitted to, and its limits."""
+    limits = relation.limits
+
+    def number(value: float | None) -> float | None:
+        return None if value is None else rounded(value)
+
+    return {
+        "std_deg": number(relation.std),
+        "rms_error_deg": rounded(relation.rms_error),
+        "left_out_error_deg": number(relation.left_out_error),
+        "told": number(relation.told),
+        "limits_deg": None
+        if limits is None
+        else [rounded(end) for end in (limits.low, limits.soft_low, limits.soft_high, limits.high)],
+    }
+
+
+def followed_over(rig: ReducedRig) -> list[str]:
+    """Channels that follow the root of a chain of controllers beyond the threshold."""
+    return [r.name for r in rig.relations if r.rmsd is not None and r.rmsd >= rig.rmsd_threshold]
+
+
 def summary(result: Mapping[str, Any], verbose: bool) -> str:
     """The rig, which all clips share, then the errors of each clip."""
     clips = result.get("clips", [result])
     lines = [_rig_text(clips[0], verbose)]
     for clip in clips:
         lines += [_error_text(clip), f"  {written_to(clip)}"]
+    if curve := result.get("curve"):
+        lines.append(curve_text(curve, verbose))
     return "\n".join(lines)
 
 
@@ -74,6 +132,7 @@ def _channels_data(rig: ReducedRig, errors: Errors, curves: Any) -> list[dict[st
             "range_deg": rounded(width),
             "rms_error_deg": rounded(rms),
             "max_error_deg": rounded(largest),
+            "fitted": fitted_data(r),
         }
         for r, width, rms, largest in zip(
             rig.relations, ranges, errors.rms, errors.max, strict=True
@@ -90,10 +149,19 @@ def _rig_text(result: Mapping[str, Any], verbose: bool) -> str:
     free = [c["name"] for c in channels if c["kind"] == "free"]
     kinds = [c["kind"] for c in channels]
     thresholds = result["thresholds"]
+    if result["measure"]:
+        most = max((len(c["controllers"]) for c in channels), default=0)
+        of = "degrees of all channels" if result["measure"] == "deg" else "mm at the fingertips"
+        how = f"up to {most} channels each; the best channels by {of}"
+    else:
+        how = (
+            f"range < {thresholds['range_deg']:g} deg, rmsd < {thresholds['rmsd']:g}, "
+            f"{result['fit']} fit"
+        )
     lines = [
         f"{len(free)} of {len(channels)} channels stay free "
-        f"({kinds.count('constant')} constant, {kinds.count('linear')} follow; range < "
-        f"{thresholds['range_deg']:g} deg, rmsd < {thresholds['rmsd']:g}, {result['fit']} fit)",
+        f"({kinds.count('constant')} constant, {kinds.count('linear')} follow"
+        + (f" {how})" if result["measure"] else f"; {how})"),
         "free: " + (" ".join(free) or "none"),
     ]
     if over := result["followed_to_root_over_threshold"]:
@@ -127,3 +195,27 @@ def _error_text(result: Mapping[str, Any]) -> str:
         f"  with the {len(result['held_channels'])} angles outside the model held: fingertips mean "
         f"{total['mean']:.1f} mm, max {total['max']:.1f} mm"
     )
+
+
+def curve_text(curve: Mapping[str, Any], verbose: bool) -> str:
+    """The error by number of channels: a table where verbose, else some of it in a line."""
+    points = curve["points"]
+    kind = "left_out" if any(p["left_out"] for p in points) else "fitted"
+    unit = curve["measure"]
+    suggested = f"suggested: --target-dofs {curve['suggested_channels']}"
+    if not verbose:
+        shown = [p for p in points if p["channels"] in SHOWN_COUNTS and p[kind]]
+        numbers = ", ".join(f"{p['channels']}: {p[kind][unit]:.2f}" for p in shown)
+        on = "on takes left out" if kind == "left_out" else "on this motion"
+        return f"RMS {unit} {on} by number of free channels: {numbers}; {suggested}"
+    head = ["free", "deg", "mm", "left out deg", "mm", "PCA deg", "mm"]
+    rows = []
+    for p in points:
+        losses = (p["fitted"], p["left_out"], p["pca"])
+        cells = [f"{x[k]:.2f}" if x else "" for x in losses for k in ("deg", "mm")]
+        rows.append([str(p["channels"]), *cells])
+    presets = ", ".join(
+        f"{p['preset']}: {p['channels']} free, {p['fitted']['deg']:.2f} deg"
+        for p in curve["presets"]
+    )
+    return "\n".join([table([head, *rows], right=tuple(range(7))), f"presets {presets}", suggested])

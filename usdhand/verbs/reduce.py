@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,13 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.motion import Clip
 from usdhand.problems import Problem
-from usdhand.reduce.method import Reduction, apply_rig, fit_rig
+from usdhand.reduce.evidence import Evidence, gather
+from usdhand.reduce.method import Reduction, apply_rig, fit_to
 from usdhand.reduce.rig import ReducedRig
-from usdhand.reduce.settings import ReduceSettings
+from usdhand.reduce.settings import Choice, ReduceSettings
 from usdhand.report.plots import reducing as plotting
 from usdhand.report.plots.style import check_plots
-from usdhand.report.reduce import reduce_result, summary
+from usdhand.report.reduce import curve_data, reduce_result, summary
 from usdhand.requests.reduce import ReduceRequest
 from usdhand.requests.shared import sides
 from usdhand.rigs import Conventions, load_conventions
@@ -69,11 +71,19 @@ def reduce_hands(
     characters = _characters(clips)
     hands = [find_hands(clip, conventions, sides, characters[i]) for i, clip in enumerate(clips)]
     sources = [h.encode(clip) for clip, h in zip(clips, hands, strict=True)]
+    evidence = None
     if rig is None:
-        controllers = settings.controllers
-        rig = fit_rig(clips, hands, settings.target, settings.fit, controllers, sources)
+        evidence = gather(zip(clips, hands, sources, strict=True))
+        rig = fit_evidence(evidence, settings)
     each = zip(clips, hands, sources, strict=True)
-    return [apply_rig(rig, clip, h, source) for clip, h, source in each]
+    return [replace(apply_rig(rig, clip, h, source), evidence=evidence) for clip, h, source in each]
+
+
+def fit_evidence(evidence: Evidence, settings: ReduceSettings) -> ReducedRig:
+    """Fit a rig as settings say."""
+    by_rules = settings.target.thresholds is not None
+    fit = settings.fit or ("paper" if by_rules else "least-squares")
+    return fit_to(evidence, settings.target, fit, settings.controllers, settings.choice)
 
 
 def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
@@ -180,7 +190,9 @@ def run(request: ReduceRequest, journal: Journal) -> Outcome:
             reduce_result(r) | {"output": None if request.dry_run else str(o)}
             for r, o in zip(reductions, outputs, strict=True)
         ]
-        return results[0] if len(results) == 1 else {"clips": results}
+        evidence = reductions[0].evidence
+        more = {} if evidence is None else {"curve": curve_data(evidence, request.settings)}
+        return (results[0] if len(results) == 1 else {"clips": results}) | more
 
     return Outcome(
         request,
@@ -204,8 +216,13 @@ def _check_fitting(request: ReduceRequest) -> None:
     used = [flag for flag, value in asked.items() if value is not None]
     if request.rig is not None and used:
         raise UsageError(f"--rig applies a rig as it is; {used[0]} fits one.")
-    if request.rig is not None and (given.fit != "paper" or given.controllers > 1):
+    if request.rig is not None and (given.fit is not None or given.controllers is not None):
         raise UsageError("--rig applies a rig as it is; --fit and --controllers are for fitting.")
+    if request.rig is not None and given.choice != Choice():
+        raise UsageError(
+            "--rig applies a rig as it is; --measure, --keep, --prefer and --symmetric are for "
+            "fitting."
+        )
     _ = given.target  # refuses what contradicts itself before anything is read
 
 

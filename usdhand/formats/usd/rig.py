@@ -17,7 +17,8 @@ from usdhand.errors import InputError
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.damage import damage_refused, refuses_damage
 from usdhand.formats.usd.read import clip_from_character
-from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, VERSION, author_rig
+from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, LIMITS, VERSION, author_rig
+from usdhand.formats.usd.rig_residuals import read_residuals
 from usdhand.formats.usd.rig_source import RigSource, rig_source
 from usdhand.formats.usd.stage import (
     Character,
@@ -29,6 +30,7 @@ from usdhand.formats.usd.write import free_child, write_motion
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.problems import Problem
+from usdhand.reduce.limits import Limits
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.rig import Kind, ReducedRig, Relation, evaluation_order
 
@@ -251,6 +253,8 @@ def _relations(prim: Usd.Prim, path: Path) -> ReducedRig:
         float(get("rmsdThreshold", float, 0.0)),
         str(get("fit", str, "paper")),
         tuple(str(s) for s in get("sources", Vt.StringArray, ())),
+        str(get("measure", str, "")),
+        read_residuals(prim, path),
     )
 
 
@@ -273,14 +277,35 @@ def _relation(prim: Usd.Prim, name: str, kind: Kind, path: Path) -> Relation:
         there = prim.GetAttribute(f"{CHANNEL_PREFIX}:{name}:{attribute}").HasAuthoredValue()
         return _number(prim, name, attribute, path) if there else None
 
-    error = number("rmsError") or 0.0
+    found = Relation(
+        name,
+        kind,
+        rms_error=number("rmsError") or 0.0,
+        left_out_error=number("leftOutError"),
+        std=number("std"),
+        limits=_limits(name, {end: number(end) for end in LIMITS}, path),
+    )
     if kind == "free":
-        return Relation(name, kind)
+        return found
     if kind == "constant":
-        return Relation(name, kind, _number(prim, name, "value", path), rms_error=error)
+        return replace(found, offset=_number(prim, name, "value", path))
     controllers, slopes = _controllers(prim, name, path)
     offset = _number(prim, name, "offset", path)
-    return Relation(name, kind, offset, controllers, slopes, number("rmsd"), error)
+    return replace(
+        found, offset=offset, controllers=controllers, slopes=slopes, rmsd=number("rmsd")
+    )
+
+
+def _limits(name: str, ends: Mapping[str, float | None], path: Path) -> Limits | None:
+    """Limits of a channel; None for rigs that say nothing of them."""
+    there = [value for value in ends.values() if value is not None]
+    if not there:
+        return None
+    if len(there) < len(LIMITS) or sorted(there) != there:
+        raise InputError(
+            f"{path}: the limits of channel '{name}' must be {', '.join(LIMITS)}, in rising order."
+        )
+    return Limits(*there)
 
 
 def _controllers(

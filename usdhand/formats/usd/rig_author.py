@@ -11,10 +11,13 @@ from usdhand.formats.hashing import file_hash
 from usdhand.motion.rotations import Array
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.rig import Relation
+from usdhand.reduce.variation import EDGES_HZ, Residuals
 
 VERSION = 1
 CHANNEL_PREFIX = "usdhand:channel"
 HELD = "held"
+# Attribute of a channel -> that end of its range.
+LIMITS = {"min": "low", "softMin": "soft_low", "softMax": "soft_high", "max": "high"}
 _TYPES = Sdf.ValueTypeNames
 
 
@@ -37,6 +40,10 @@ def author_rig(
     _set(prim, "usdhand:fit", _TYPES.Token, rig.fit)
     _set(prim, "usdhand:rangeThreshold", _TYPES.Double, rig.range_threshold)
     _set(prim, "usdhand:rmsdThreshold", _TYPES.Double, rig.rmsd_threshold)
+    if rig.measure:
+        _set(prim, "usdhand:measure", _TYPES.Token, rig.measure)
+    if rig.residuals is not None:
+        _author_residuals(prim, rig.residuals)
     _set(prim, "usdhand:sources", _TYPES.StringArray, Vt.StringArray(list(rig.sources)))
     if clip.origin.path is not None:
         _set(prim, "usdhand:sourceHash", _TYPES.String, file_hash(clip.origin.path))
@@ -73,6 +80,14 @@ def _author_channel(
 ) -> None:
     name = relation.name
     _set_channel(prim, name, "kind", _TYPES.Token, relation.kind)
+    if relation.std is not None:
+        _set_channel(prim, name, "std", _TYPES.Double, relation.std)
+    if relation.limits is not None:
+        for end in LIMITS:
+            value = getattr(relation.limits, LIMITS[end])
+            _set_channel(prim, name, end, _TYPES.Double, value)
+    if relation.left_out_error is not None and relation.kind != "free":
+        _set_channel(prim, name, "leftOutError", _TYPES.Double, relation.left_out_error)
     if relation.kind == "free" and curve is not None:
         attribute = _set_channel(prim, name, "value", _TYPES.Double, None)
         for time, value in zip(times, curve.tolist(), strict=True):
@@ -93,6 +108,15 @@ def _author_channel(
         _set_channel(prim, name, "controllers", _TYPES.TokenArray, names)
         slopes = Vt.DoubleArray(list(relation.slopes))
         _set_channel(prim, name, "slopes", _TYPES.DoubleArray, slopes)
+
+
+def _author_residuals(prim: Sdf.PrimSpec, residuals: Residuals) -> None:
+    """Mixtures as one array: bands x noises x channels."""
+    names = Vt.TokenArray(list(residuals.names))
+    _set(prim, "usdhand:residual:channels", _TYPES.TokenArray, names)
+    _set(prim, "usdhand:residual:bands", _TYPES.DoubleArray, Vt.DoubleArray(list(EDGES_HZ)))
+    flat = Vt.FloatArray.FromNumpy(residuals.mixtures.astype(np.float32).ravel())
+    _set(prim, "usdhand:residual:mixtures", _TYPES.FloatArray, flat)
 
 
 def _set_channel(

@@ -1,0 +1,180 @@
+"""The best few channels for a number or an error that is asked for, and how others follow them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from usdhand.anatomy.channels import is_flexion
+from usdhand.errors import QualityError, UsageError
+from usdhand.motion.rotations import Array
+from usdhand.reduce.evidence import Evidence
+from usdhand.reduce.fit import SMALLEST_RANGE_DEG
+from usdhand.reduce.limits import Limits
+from usdhand.reduce.relate import RIDGES, Shape, best_shape, left_out, residual_moments, told_by
+from usdhand.reduce.rig import Relation
+from usdhand.reduce.settings import Choice, Target
+from usdhand.reduce.subset import Subsets
+
+# A twist or spread must lower the squared error so many times more than a flexion.
+PREFERENCE = 1.2
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Free channels, and the matrix by which all follow from them (see `relate`)."""
+
+    free: tuple[int, ...]
+    shape: Shape
+    told: Array
+
+
+def choose(evidence: Evidence, target: Target, controllers: int | None, choice: Choice) -> Model:
+    """Channels for a number of them, or the fewest for a largest error.
+
+    Raises
+    ------
+    UsageError
+        if the number is negative or less than what is kept, or a kept channel does not exist.
+    QualityError
+        if the largest error is not a positive number.
+    """
+    if target.free_channels is not None:
+        return _for_count(evidence, target.free_channels, controllers, choice)
+    assert target.max_error is not None
+    return _for_error(evidence, target.max_error, controllers, choice)
+
+
+def subsets(evidence: Evidence, choice: Choice, largest: float | None = None) -> Subsets:
+    """The search among the channels that move, or that are kept.
+
+    Raises
+    ------
+    UsageError
+        if a kept channel does not exist, or the same channels are wanted of one hand.
+    """
+    names, moments = evidence.names, evidence.moments
+    kept = {name for pattern in choice.keep for name in _named(names, pattern)}
+    moving = moments.high - moments.low > SMALLEST_RANGE_DEG
+    wanted = {name for name, moves in zip(names, moving, strict=True) if moves} | kept
+    if choice.symmetric:
+        if len({name[:2] for name in names}) < 2:
+            raise UsageError("The same channels of both hands need both hands.")
+        digits = {name[2:] for name in wanted}
+        wanted = {name for name in names if name[2:] in digits}
+    together: dict[str, list[int]] = {}
+    for i, name in enumerate(names):
+        if name in wanted:
+            together.setdefault(name[2:] if choice.symmetric else name, []).append(i)
+    groups = tuple(tuple(own) for own in together.values())
+    keep = frozenset(g for g, own in enumerate(groups) if any(names[i] in kept for i in own))
+    dear = [not any(is_flexion(names[i]) for i in own) for own in groups]
+    price = np.where(dear, PREFERENCE, 1.0) if choice.prefer == "flexion" else None
+    return Subsets(
+        moments.covariance, evidence.measure(choice.measure), groups, keep, price, largest
+    )
+
+
+def model_of(
+    evidence: Evidence, free: Sequence[int], controllers: int | None, choice: Choice
+) -> Model:
+    """How all channels follow the free ones."""
+    measure = evidence.measure(choice.measure)
+    shape = best_shape(evidence.folds, free, measure, controllers)
+    return Model(tuple(free), shape, told_by(evidence.moments, free, shape))
+
+
+def relations_of(evidence: Evidence, model: Model) -> tuple[Relation, ...]:
+    """The model as relations of a rig."""
+    moments, names = evidence.moments, evidence.names
+    std = moments.std
+    missed = residual_moments(model.told, moments, moments)
+    errors = np.sqrt(np.maximum(np.diag(missed), 0.0))
+    unseen: list[float | None] = [None] * len(names)
+    if len(evidence.folds) > 1:
+        square = np.diag(left_out(evidence.folds, model.free, model.shape))
+        unseen = [float(e) for e in np.sqrt(np.maximum(square, 0.0))]
+    free = set(model.free)
+
+    def relation(a: int) -> Relation:
+        limits = Limits.of(names[a], float(moments.low[a]), float(moments.high[a]))
+        if a in free:
+            return Relation(names[a], "free", std=float(std[a]), limits=limits)
+        chosen = np.flatnonzero(model.told[a])
+        slopes = model.told[a, chosen]
+        linear = len(chosen) > 0
+        return Relation(
+            names[a],
+            "linear" if linear else "constant",
+            offset=float(moments.mean[a] - slopes @ moments.mean[chosen]),
+            controllers=tuple(names[b] for b in chosen),
+            slopes=tuple(float(s) for s in slopes),
+            rms_error=float(errors[a]),
+            left_out_error=unseen[a],
+            std=float(std[a]),
+            limits=limits if linear else None,
+        )
+
+    return tuple(relation(a) for a in range(len(names)))
+
+
+def _for_count(evidence: Evidence, count: int, controllers: int | None, choice: Choice) -> Model:
+    if count < 0:
+        raise UsageError(f"{count} free channels are not possible: give 0 or more.")
+    search = subsets(evidence, choice)
+    if len(search.channels(search.keep)) > count:
+        raise UsageError(
+            f"{len(search.channels(search.keep))} channels are to be kept free, which is more than "
+            f"the {count} that are asked for."
+        )
+    sizes = sorted(len(group) for group in search.groups)
+    groups = int(np.searchsorted(np.cumsum(sizes), count, side="right"))
+    free = search.best(groups)
+    while len(search.channels(free)) > count:
+        groups -= 1
+        free = search.best(groups)
+    return model_of(evidence, search.channels(free), controllers, choice)
+
+
+def _for_error(evidence: Evidence, most: float, controllers: int | None, choice: Choice) -> Model:
+    if not most > 0:
+        raise QualityError(
+            f"An RMS error of at most {most:g} degrees is not possible: give a number above 0."
+        )
+    search = subsets(evidence, choice, most)
+    measure, moments = search.measure, evidence.moments
+
+    def met(told: Array) -> bool:
+        parts = measure.parts(residual_moments(told, moments, moments))
+        return bool(parts.max(initial=0.0) <= most**2)
+
+    def model(free: Sequence[int]) -> Model | None:
+        """What serves takes left out if it meets the error, else what fits most closely."""
+        found = model_of(evidence, free, controllers, choice)
+        if met(found.told):
+            return found
+        shape = Shape(controllers, RIDGES[0])
+        closest = told_by(moments, free, shape)
+        return Model(tuple(free), shape, closest) if met(closest) else None
+
+    for chosen in search.path():
+        if measure.parts(search.residual(chosen)).max(initial=0.0) > most**2:
+            continue  # not even with all controllers
+        tried = (search.best(len(chosen) - 1),) if len(chosen) > len(search.keep) else ()
+        for free in (*tried, chosen):
+            found = model(search.channels(free))
+            if found is not None:
+                return found
+    return model_of(evidence, search.channels(frozenset(range(len(search.groups)))), None, choice)
+
+
+def _named(names: Sequence[str], pattern: str) -> list[str]:
+    found = [name for name in names if fnmatchcase(name, pattern)]
+    if not found:
+        raise UsageError(
+            f"There is no channel '{pattern}' to keep free; there are {', '.join(names)}."
+        )
+    return found

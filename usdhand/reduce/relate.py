@@ -1,0 +1,126 @@
+"""How dependent channels follow the free ones: ridge regression on a few controllers each.
+
+A model is a matrix ``told`` (n, n) that gives all channels, less their means, from themselves: the
+rows of free channels are those of the identity, the others have coefficients at free channels only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usdhand.motion.rotations import Array
+from usdhand.reduce.moments import Moments, pooled
+from usdhand.reduce.subset import SAME_SHARE, TINY, Measure
+
+# Shares of each controller's variance that are tried as ridge, and numbers of controllers.
+RIDGES = (1e-9, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+NUMBERS = (1, 2, 3, 4, 6, 9, 14)
+# Fewer controllers are taken where they raise the error by no more than this share.
+WORTHWHILE = 0.01
+
+
+@dataclass(frozen=True)
+class Shape:
+    """How a model is fitted: at most so many controllers a channel (None: all), and the ridge."""
+
+    controllers: int | None = None
+    ridge: float = RIDGES[0]
+
+
+def told_by(moments: Moments, free: Sequence[int], shape: Shape) -> Array:
+    """(n, n) model of all channels from the free ones."""
+    covariance = moments.covariance
+    n, k = len(covariance), len(free)
+    told = np.zeros((n, n))
+    told[free, free] = 1.0
+    dependent = np.setdiff1d(np.arange(n), free)
+    if not k or not len(dependent):
+        return told
+    most = k if shape.controllers is None else min(shape.controllers, k)
+    order, left = _controllers_in_order(covariance, np.asarray(free), dependent, most)
+    enough = left <= left[:, -1:] * (1.0 + WORTHWHILE) ** 2 + TINY
+    counts = enough.argmax(axis=1)
+    ridge = covariance + np.diag((SAME_SHARE + shape.ridge) * np.diag(covariance) + TINY)
+    for count in np.unique(counts[counts > 0]):
+        rows = np.flatnonzero(counts == count)
+        chosen = order[rows, :count]
+        among = ridge[chosen[:, :, None], chosen[:, None, :]]
+        across = covariance[chosen, dependent[rows, None]]
+        slopes = np.linalg.solve(among, across[..., None])[..., 0]
+        told[dependent[rows, None], chosen] = slopes
+    return told
+
+
+def residual_moments(told: Array, fitted: Moments, shown: Moments) -> Array:
+    """(n, n) second moments of what a model with the means of ``fitted`` misses on ``shown``."""
+    missed = np.eye(len(told)) - told
+    return np.asarray(missed @ shown.about(fitted.mean) @ missed.T)
+
+
+def left_out(folds: Sequence[Moments], free: Sequence[int], shape: Shape) -> Array:
+    """(n, n) second moments of what models fitted to the other folds miss on each fold."""
+    frames = sum(fold.frames for fold in folds)
+    total = np.zeros((len(folds[0].mean),) * 2)
+    for i, fold in enumerate(folds):
+        others = pooled(f for j, f in enumerate(folds) if j != i)
+        missed = residual_moments(told_by(others, free, shape), others, fold)
+        total += fold.frames / frames * missed
+    return total
+
+
+def best_shape(
+    folds: Sequence[Moments], free: Sequence[int], measure: Measure, most: int | None
+) -> Shape:
+    """Ridge, and number of controllers up to ``most``, with the least error on folds left out.
+
+    Of what is about as good, the fewest controllers. One fold alone shows nothing about others:
+    all controllers then, and no ridge.
+    """
+    if len(folds) < 2 or not len(free):
+        return Shape(most)
+
+    def error(shape: Shape) -> float:
+        return float(measure.parts(left_out(folds, free, shape)).mean())
+
+    ridge = min(RIDGES, key=lambda r: (error(Shape(most, r)), r))
+    limit = len(free) if most is None else min(most, len(free))
+    tried = [Shape(n, ridge) for n in NUMBERS if n < limit] + [Shape(most, ridge)]
+    errors = [error(shape) for shape in tried]
+    return next(
+        shape
+        for shape, e in zip(tried, errors, strict=True)
+        if e <= min(errors) * (1.0 + WORTHWHILE) ** 2
+    )
+
+
+def _controllers_in_order(
+    covariance: Array, free: NDArray[np.intp], dependent: NDArray[np.intp], most: int
+) -> tuple[NDArray[np.intp], Array]:
+    """Controllers (dependent, most), each the best beside those before it, and variances left.
+
+    Variances (dependent, most + 1) are left of 0, 1, ... controllers. All dependent channels at
+    once: each has its own residual covariance of the free channels and itself.
+    """
+    d, k = len(dependent), len(free)
+    rows = np.arange(d)
+    index = np.concatenate([np.broadcast_to(free, (d, k)), dependent[:, None]], axis=1)
+    residual = covariance[index[:, :, None], index[:, None, :]]
+    own = np.diag(covariance)[free]
+    order = np.zeros((d, most), dtype=np.intp)
+    left = np.empty((d, most + 1))
+    left[:, 0] = residual[:, k, k]
+    for step in range(most):
+        among = residual[:, np.arange(k), np.arange(k)]
+        gain = residual[:, :k, k] ** 2 / (np.maximum(among, 0.0) + SAME_SHARE * own + TINY)
+        gain[among <= 2 * SAME_SHARE * own] = -1.0  # chosen already, or told by those
+        best = gain.argmax(axis=1)
+        order[:, step] = free[best]
+        column = residual[rows, :, best]
+        pivot = column[rows, best] + SAME_SHARE * own[best] + TINY
+        residual = residual - column[:, :, None] * (column / pivot[:, None])[:, None, :]
+        left[:, step + 1] = np.maximum(residual[:, k, k], 0.0)
+    return order, left
