@@ -128,7 +128,9 @@ def fit_to(
         fitted = fit_relations(names, statistics, thresholds, fit, most_controllers or 1)
         relations = _with_limits(fitted, moments)
     dependent = [i for i, r in enumerate(relations) if r.kind != "free"]
-    residuals = Residuals.of(names, relation_matrix(relations), dependent, evidence.bands)
+    residuals = None
+    if dependent:
+        residuals = Residuals.of(names, relation_matrix(relations), dependent, evidence.bands)
     return ReducedRig(
         relations,
         evidence.held,

@@ -90,7 +90,7 @@ class ReducedRig:
     fit: str = "paper"
     sources: tuple[str, ...] = ()
     measure: str = ""
-    residuals: Residuals | None = field(default=None, compare=False)
+    residuals: Residuals | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

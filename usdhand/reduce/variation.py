@@ -46,18 +46,18 @@ def _square(rows: Array) -> Array:
     return np.asarray(rows.T @ rows)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Residuals:
     """What a rig does not keep: mixtures of independent noises, by band of frequency.
 
     Attributes
     ----------
     names : d channels that are not free
-    mixtures : (bands, noises, d) degrees of each channel for one standard deviation of each noise
+    mixtures : by band and noise, degrees of each channel for one standard deviation of the noise
     """
 
     names: tuple[str, ...]
-    mixtures: Array
+    mixtures: tuple[tuple[tuple[float, ...], ...], ...]
 
     @classmethod
     def of(cls, names: Sequence[str], told: Array, dependent: Sequence[int], bands: Array) -> Self:
@@ -73,7 +73,20 @@ class Residuals:
         kept = variances.sum(axis=0).cumsum() <= KEPT_SHARE * variances.sum()
         noises = min(int(kept.sum()) + 1, len(kept))
         mixtures = np.swapaxes(axes * np.sqrt(variances)[:, None], 1, 2)[:, :noises]
-        return cls(tuple(names[i] for i in dependent), mixtures)
+        return cls.from_array([names[i] for i in dependent], mixtures)
+
+    @classmethod
+    def from_array(cls, names: Sequence[str], mixtures: Array) -> Self:
+        """Residuals of mixtures (bands, noises, d)."""
+        bands = (tuple(tuple(noise) for noise in band) for band in mixtures.tolist())
+        return cls(tuple(names), tuple(bands))
+
+    @property
+    def array(self) -> Array:
+        """(bands, noises, d) mixtures."""
+        return np.array(self.mixtures, dtype=np.float64).reshape(
+            len(self.mixtures), -1, len(self.names)
+        )
 
     def noise(self, frames: int, fps: float, seed: int) -> Array:
         """(frames, d) motion in degrees with these correlations; the same for the same seed."""
@@ -81,7 +94,7 @@ class Residuals:
         size = fft.next_fast_len(max(frames, round(LEAST_S * fps)), real=True)
         band = bands_of(size, fps)
         total = np.zeros((frames, len(self.names)))
-        for number, mixture in enumerate(self.mixtures):
+        for number, mixture in enumerate(self.array):
             own = (band == number) & (np.arange(len(band)) > 0)  # the mean is no motion
             if not own.any() or not len(mixture):
                 continue

@@ -115,7 +115,7 @@ def _author_residuals(prim: Sdf.PrimSpec, residuals: Residuals) -> None:
     names = Vt.TokenArray(list(residuals.names))
     _set(prim, "usdhand:residual:channels", _TYPES.TokenArray, names)
     _set(prim, "usdhand:residual:bands", _TYPES.DoubleArray, Vt.DoubleArray(list(EDGES_HZ)))
-    flat = Vt.FloatArray.FromNumpy(residuals.mixtures.astype(np.float32).ravel())
+    flat = Vt.FloatArray.FromNumpy(residuals.array.astype(np.float32).ravel())
     _set(prim, "usdhand:residual:mixtures", _TYPES.FloatArray, flat)
 
 

@@ -31,11 +31,9 @@ def read_residuals(prim: Usd.Prim, path: Path) -> Residuals | None:
         values = np.array(mixtures, dtype=np.float64)
         fits = edges.shape == (len(EDGES_HZ),) and bool(np.allclose(edges, EDGES_HZ))
         fits = fits and values.ndim == 1 and bool((np.abs(values) <= LARGEST_DEG).all())
-        shaped = values.reshape(len(EDGES_HZ), -1, len(names)) if names else None
+        shaped = values.reshape(len(EDGES_HZ), -1, len(names))
     except (TypeError, ValueError):
         fits = False
     if not fits:
         raise InputError(f"{path}: what the rig says of its residuals is damaged.")
-    if shaped is None:
-        return Residuals((), np.zeros((len(EDGES_HZ), 0, 0)))
-    return Residuals(names, shaped)
+    return Residuals.from_array(names, shaped)
