@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
 import os
 import re
 import shlex
 import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -22,9 +23,11 @@ from pxr import Usd
 
 import usdhand
 from usdhand.anatomy.angles import from_euler, from_swing_twist
+from usdhand.anatomy.channels import Channels
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
-from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.limits import Limits
+from usdhand.reduce.rig import ReducedRig, Relation
 from usdhand.reduce.settings import ReduceSettings
 
 ADD_ON = REPOSITORY / "docs" / "blender" / "usdhand_rig"
@@ -168,6 +171,30 @@ def test_edits_come_back_and_the_blend_file_keeps_its_drivers(tmp_path: Path) ->
 
 
 @in_blender
+@pytest.mark.parametrize("controllers", [3, None], ids=["three", "all"])
+def test_many_controllers_and_edits_beyond_the_limits(
+    tmp_path: Path, controllers: int | None
+) -> None:
+    """Sums too long for one driver, and free channels moved so far that dependents bend off."""
+    clip = usdhand.read_clip(SAMPLES / "gestures" / "big_03.usdc")
+    rig = reduced(clip, tmp_path / "rig.usdc", free_channels=22, controllers=controllers)
+    most = max(len(r.controllers) for r in rig.relations)
+    assert most == 3 if controllers else most > 18
+    followed = [n for n in rig.free if any(n in r.controllers for r in rig.relations)]
+    edits: list[list[object]] = [["offset", name, 60.0] for name in followed[::3]]
+    trip(clip, tmp_path, edits, tmp_path / "rig.usdc")
+    stored = usdhand.read_rig(tmp_path / "rig.usdc")
+    assert stored.relations == rig.relations
+    moved = {str(name): 60.0 for _, name, _ in edits}
+    reached = 0
+    for r in rig.relations:
+        if r.kind == "linear" and r.limits:
+            by = sum(s * moved.get(c, 0.0) for c, s in zip(r.controllers, r.slopes, strict=True))
+            reached += abs(by) > r.limits.soft_high - r.limits.soft_low
+    assert reached
+
+
+@in_blender
 def test_other_units_and_up_axis(tmp_path: Path) -> None:
     clip = usdhand.read_clip(SAMPLES / "gestures_ben" / "wipe_01.usdc")
     rig = reduced(clip, tmp_path / "rig.usda")
@@ -214,13 +241,10 @@ def test_files_that_are_no_rig_and_outputs_that_are_are_refused(tmp_path: Path) 
 
 
 def module(name: str) -> ModuleType:
-    """A module of the add-on that needs no Blender."""
-    spec = importlib.util.spec_from_file_location(f"usdhand_rig_{name}", ADD_ON / f"{name}.py")
-    assert spec
-    assert spec.loader
-    found = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(found)
-    return found
+    """A module of the add-on that needs no Blender, in a package that is not loaded."""
+    package = sys.modules.setdefault("usdhand_rig_bare", ModuleType("usdhand_rig_bare"))
+    package.__path__ = [str(ADD_ON)]
+    return importlib.import_module(f"usdhand_rig_bare.{name}")
 
 
 def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
@@ -257,6 +281,44 @@ def test_expressions_are_the_rotations_of_channels(side: str, ball: bool) -> Non
         values = {**cosines, **dict(zip("aft", angles, strict=True))}
         w, *xyz = (eval(e, {"__builtins__": {}}, values) for e in expressions)
         assert np.allclose([*xyz, w], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("count", [1, 3, 9, 22, 49])
+@pytest.mark.parametrize("limits", [None, (-30.0, -12.25, 41.5, 100.0), (-5.0, -5.0, 9.0, 9.0)])
+def test_expressions_of_followers_are_their_relations(
+    count: int, limits: tuple[float, ...] | None
+) -> None:
+    followers, rig_file = module("followers"), module("rig_file")
+    chance = np.random.default_rng(count)
+    slopes, names = chance.normal(size=count), tuple(f"riChannel{i}" for i in range(count))
+    channel = rig_file.Channel(
+        "riFollower", "linear", (), (0.0,), names, tuple(slopes), 3.5, limits
+    )
+    relation = Relation(
+        "riFollower",
+        "linear",
+        3.5,
+        names,
+        tuple(slopes),
+        limits=Limits(*limits) if limits else None,
+    )
+    rig = ReducedRig((*(Relation(n, "free") for n in names), relation))
+    curves = chance.uniform(-150, 150, (40, count))
+    expected = rig.evaluate(Channels(names, curves)).select(["riFollower"]).values[:, 0]
+    found = []
+    for row in curves:
+        values = dict(zip(names, row.tolist(), strict=True))
+        for name, expression, variables in followers.drivers(channel):
+            assert len(expression) <= followers.LONGEST
+            own = {letter: values[of] for letter, of in variables}
+            scope = {"min": min, "max": max, "__builtins__": {}, **own}
+            values[name] = eval(expression, scope)
+        found.append(values["riFollower"])
+    assert np.abs(np.array(found) - expected).max() < 1e-3
+    drawn = [name for name, *_ in followers.drivers(channel)]
+    assert drawn[-1] == "riFollower"
+    assert count > 1 or len(drawn) == 1
+    assert count < 22 or len(drawn) > 1
 
 
 def test_thinned_keys_stay_within_the_tolerance() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import bpy
 import numpy as np
 
-from . import rotations
+from . import followers, rotations
 from .keys import thinned
 from .rig_file import SAME_DEG, Channel, HandRig, Joint, RigError, read_rigs
 
@@ -137,6 +137,8 @@ def _armature(rig: HandRig, new: list[bpy.types.Object]) -> bpy.types.Object:
 def _add_property(armature: bpy.types.Object, channel: Channel, joint: Joint, motion: str) -> None:
     limits = LIMITS.get(joint.name, LIMITS.get(joint.name[-3:], ((-90, 90),) * 3))
     low, high = limits["fat".index(motion)]
+    if channel.limits:
+        low, _, _, high = channel.limits
     armature[channel.name] = channel.values[0]
     armature.id_properties_ui(channel.name).update(
         description=f"{joint.side.title()} {joint.name}: {MOTIONS[motion]} in degrees "
@@ -166,11 +168,12 @@ def _add_keys(armature: bpy.types.Object, channel: Channel, group: str, thin: fl
 
 
 def _drive_channel(armature: bpy.types.Object, channel: Channel) -> None:
-    letters = [f"c{i}" for i in range(len(channel.controllers))]
-    terms = [f"{slope:+.9g}*{c}" for slope, c in zip(channel.slopes, letters, strict=True)]
-    expression = f"{channel.offset:.9g}" + "".join(terms)
-    curve = armature.driver_add(f'["{channel.name}"]')
-    _set_driver(curve, armature, expression, zip(letters, channel.controllers, strict=True))
+    """One driver, or several where an expression would be longer than Blender keeps one."""
+    for name, expression, variables in followers.drivers(channel):
+        if name != channel.name:
+            armature[name] = 0.0
+        curve = armature.driver_add(f'["{name}"]')
+        _set_driver(curve, armature, expression, variables)
 
 
 def _drive_bone(armature: bpy.types.Object, joint: Joint, helper: str | None) -> None:

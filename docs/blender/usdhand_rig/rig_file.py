@@ -14,6 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdSkel
 
 VERSION = 1
 PREFIX = "usdhand:channel"
+LIMITS = ("min", "softMin", "softMax", "max")
 SUFFIXES = (".usda", ".usdc", ".usd")
 # Keys of Blender are single precision.
 SAME_DEG = 1e-3
@@ -28,7 +29,8 @@ class Channel:
     """One rotation angle of one joint, degrees.
 
     ``times`` (time codes) and ``values`` are the curve of a free channel, or one value at no time;
-    a linear one is ``offset + sum(slopes * controllers)``.
+    a linear one is ``offset + sum(slopes * controllers)``, which bends off beyond the inner two of
+    its ``limits`` (min, softMin, softMax, max) and never passes the outer two.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Channel:
     controllers: tuple[str, ...] = ()
     slopes: tuple[float, ...] = ()
     offset: float = 0.0
+    limits: tuple[float, float, float, float] | None = None
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Values of a curve as ``usdhand expand`` reads it: straight between the samples."""
@@ -227,6 +230,7 @@ def _channel(prim: Usd.Prim, name: str) -> Channel:
             controllers=tuple(controllers),
             slopes=tuple(slopes),
             offset=float(get("offset")),
+            limits=_limits(prim, name),
         )
     if kind not in ("free", "constant", "held"):
         raise RigError(f"Channel '{name}' has the unknown kind '{kind}'.")
@@ -235,7 +239,17 @@ def _channel(prim: Usd.Prim, name: str) -> Channel:
     values = [query.Get(t) for t in times] or [get("value")]
     if not all(isinstance(v, (int, float)) and np.isfinite(v) for v in values):
         raise RigError(f"The curve of channel '{name}' has values that are no angles.")
-    return Channel(name, kind, tuple(times), tuple(map(float, values)))
+    return Channel(name, kind, tuple(times), tuple(map(float, values)), limits=_limits(prim, name))
+
+
+def _limits(prim: Usd.Prim, name: str) -> tuple[float, float, float, float] | None:
+    """Limits of a channel; None for rigs that say nothing of them."""
+    ends = [prim.GetAttribute(f"{PREFIX}:{name}:{end}").Get() for end in LIMITS]
+    if not any(isinstance(end, float) for end in ends):
+        return None
+    if not all(isinstance(end, float) for end in ends) or sorted(ends) != ends:
+        raise RigError(f"The limits of channel '{name}' are damaged.")
+    return tuple(ends)
 
 
 def _joints(prim: Usd.Prim, side: str) -> list[Joint]:
