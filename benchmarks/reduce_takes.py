@@ -1,16 +1,17 @@
 """What reduction loses on a folder of takes, as Markdown tables for the documentation.
 
-    python benchmarks/reduce_takes.py [--data FOLDER]
+    python benchmarks/reduce_takes.py [--data FOLDER] [--others FOLDER_OR_FILE ...]
 
 Without a folder: the samples' gestures. Errors in degrees are RMS over the 50 modelled channels,
 errors in millimetres are distances of the ten fingertips, both against the same motion with the
-angles outside the model held; what holding them loses is a table of its own.
+angles outside the model held; what holding them loses is a table of its own. Rigs fitted to the
+takes are applied to the others as well.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,10 +23,15 @@ from usdhand import find_hands, read_clip
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
+from usdhand.reduce.choose import subsets
+from usdhand.reduce.curve import error_curve
 from usdhand.reduce.errors import Errors, pca_rms
-from usdhand.reduce.method import apply_rig, fit_rig
+from usdhand.reduce.evidence import Evidence, gather
+from usdhand.reduce.fit import Statistics
+from usdhand.reduce.method import apply_rig, fit_rig, fit_to
 from usdhand.reduce.rig import ReducedRig
-from usdhand.reduce.settings import PRESETS, Fit, Target
+from usdhand.reduce.search import thresholds_for_count
+from usdhand.reduce.settings import PRESETS, Choice, Fit, Target
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "gestures"
 FITS: dict[str, tuple[Fit, int]] = {
@@ -34,6 +40,9 @@ FITS: dict[str, tuple[Fit, int]] = {
     "up to 3 controllers": ("least-squares", 3),
 }
 COUNTS = range(5, 55, 5)
+# Best channels and thresholds searched for the same number: label -> most controllers.
+BEST: dict[str, int | None] = {"best": None, "best, at most 3": 3, "best, 1": 1}
+SEARCHED: dict[str, int] = {"searched, at most 3": 3, "searched, 1": 1}
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +71,22 @@ def fitted(takes: Sequence[Take], target: Target, fit: str) -> ReducedRig:
     kind, most = FITS[fit]
     clips, hands, sources = zip(*((t.clip, t.hands, t.source) for t in takes), strict=True)
     return fit_rig(clips, hands, target, kind, most, sources)
+
+
+def best(
+    takes: Sequence[Take], count: int, most: int | None = None, choice: Choice | None = None
+) -> ReducedRig:
+    """One rig of the best channels for all takes."""
+    evidence = gather((t.clip, t.hands, t.source) for t in takes)
+    return fit_to(evidence, Target(free_channels=count), "least-squares", most, choice)
+
+
+def searched(takes: Sequence[Take], count: int, most: int) -> ReducedRig:
+    """One rig for all takes by the paper's rules, with thresholds searched for the count."""
+    statistics = Statistics.of(np.concatenate([t.curves for t in takes]))
+    target = Target(thresholds_for_count(statistics, count, "least-squares"))
+    clips, hands, sources = zip(*((t.clip, t.hands, t.source) for t in takes), strict=True)
+    return fit_rig(clips, hands, target, "least-squares", most, sources)
 
 
 @dataclass(frozen=True)
@@ -178,38 +203,115 @@ def print_presets(takes: Sequence[Take]) -> None:
     )
 
 
-def print_curve(takes: Sequence[Take]) -> None:
-    """Table of errors by number of free channels."""
-    print("**Error against number of channels**, one rig for all takes (`--target-dofs`).\n")
-    pooled = np.concatenate([t.curves for t in takes])
+def print_alone(takes: Sequence[Take]) -> None:
+    """Table of every take alone: best channels, and thresholds searched for the same count."""
+    print("**Every take alone**, so many channels free (means over the takes). Degrees RMS.\n")
     rows = []
-    for count in COUNTS:
-        rigs = [fitted(takes, Target(free_channels=count), fit) for fit in FITS]
-        losses = [loss(r, takes) for r in rigs]
-        rig = rigs[0]
-        rows.append(
-            (
-                len(rig.free),
-                f"{rig.range_threshold:.1f}, {rig.rmsd_threshold:.2f}",
-                *(x.rms for x in losses),
-                pca_rms(pooled, len(rig.free)),
-                *(f"{x.tips_mean:.1f} ({x.tips_max:.0f})" for x in losses),
-            )
-        )
-    table(("free", "range (deg), rmsd", *LOSS_HEADS[2:]), rows)
+    for count in (6, 10, 15, 20):
+        pca = float(np.mean([pca_rms(t.curves, count) for t in takes]))
+        cells: list[Any] = [count, pca]
+        cells += [
+            float(np.mean([loss(best([t], count, n), [t]).rms for t in takes]))
+            for n in BEST.values()
+        ]
+        cells += [
+            float(np.mean([loss(searched([t], count, n), [t]).rms for t in takes]))
+            for n in SEARCHED.values()
+        ]
+        rows.append(cells)
+    table(("free", "PCA", *BEST, *SEARCHED), rows)
+    needed = [_for_one_degree(gather([(t.clip, t.hands, t.source)])) for t in takes]
+    own, pca_count = (float(np.mean([n[k] for n in needed])) for k in (0, 1))
+    print(
+        f"For 1 degree RMS a take needs {own:.1f} free channels (mean), PCA {pca_count:.1f} "
+        f"components: {own / pca_count:.2f} times as many.\n"
+    )
+
+
+def _for_one_degree(evidence: Evidence) -> tuple[int, int]:
+    """Fewest free channels, and components of PCA, with 1 degree RMS."""
+    variances = np.linalg.eigvalsh(evidence.moments.covariance)[::-1]
+    left = np.sqrt(np.maximum(variances.sum() - np.cumsum([0.0, *variances]), 0.0) / 50)
+    components = int(np.argmax(left <= 1.0))
+    search = subsets(evidence, Choice())
+    for count in range(components, len(search.groups) + 1):
+        residual = search.residual(search.best(count))
+        if np.sqrt(np.diag(residual).mean()) <= 1.0:
+            return count, components
+    return len(evidence.names), components
+
+
+def print_others(takes: Sequence[Take], others: Sequence[Path]) -> None:
+    """Tables of one rig for two thirds of the takes, on the last third and on other motion."""
+    known = [t for i, t in enumerate(takes) if i % 3 != 2]
+    groups = {"left out": [t for i, t in enumerate(takes) if i % 3 == 2]}
+    for folder in others:
+        paths = [folder] if folder.is_file() else sorted(folder.glob("*.usd*"))
+        groups[folder.name] = [t for t in map(Take.read, paths) if _fits(t, known[0])]
+    known_curves = np.concatenate([t.curves for t in known])
+    print(
+        f"**One rig for {len(known)} takes**, so many channels free: on these, on the other "
+        f"{len(groups['left out'])} (every third by name)"
+        + "".join(f", on {len(g)} of `{n}`" for n, g in list(groups.items())[1:])
+        + ". Degrees RMS.\n"
+    )
+    groups = {"fitted": known, **groups}
+    rows: list[list[Any]] = []
+    for count in (10, 15, 20, 25):
+        rigs = {label: best(known, count, n) for label, n in BEST.items()}
+        rigs |= {label: searched(known, count, n) for label, n in SEARCHED.items()}
+        for name, group in groups.items():
+            curves = np.concatenate([t.curves for t in group])
+            pca = pca_on_others(known_curves, curves, count)
+            rows.append([count, name, pca, *(loss(r, group).rms for r in rigs.values())])
+    table(("free", "on", "PCA", *BEST, *SEARCHED), rows)
+
+    print("**The fingertips**, one rig for the same takes, 15 channels free. Mean mm.\n")
+    rigs = {
+        "best by deg": best(known, 15),
+        "best by mm": best(known, 15, None, Choice("mm")),
+        **{label: searched(known, 15, n) for label, n in SEARCHED.items()},
+    }
+    table(
+        ("on", *rigs),
+        [[n, *(loss(r, g).tips_mean for r in rigs.values())] for n, g in groups.items()],
+    )
+
+
+def _fits(take: Take, other: Take) -> bool:
+    return take.hands.model_names == other.hands.model_names
+
+
+def print_curve(takes: Sequence[Take]) -> None:
+    """Table of errors by number of free channels, one rig for all takes."""
+    print("**Error against number of channels**, one rig for all takes (`--target-dofs`).\n")
+    evidence = gather((t.clip, t.hands, t.source) for t in takes)
+    curve = error_curve(evidence)
+    rows = []
+    for point in curve.points:
+        cells: list[Any] = [point.channels]
+        for found in (point.fitted, point.left_out, point.pca, point.pca_left_out):
+            cells += ["", ""] if found is None else [found.deg, found.mm]
+        rows.append(cells)
+    heads = ("fitted", "left out", "PCA", "PCA, left out")
+    table(("free", *(f"{h}, {unit}" for h in heads for unit in ("deg", "mm RMS"))), rows)
+    print(f"Suggested number of channels (the knee): {curve.suggested}.\n")
 
 
 def main() -> None:
     """Read the takes and print every table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, default=SAMPLES)
-    folder: Path = parser.parse_args().data
+    parser.add_argument("--others", type=Path, nargs="*", default=[])
+    given = parser.parse_args()
+    folder: Path = given.data
     takes = [Take.read(p) for p in sorted(folder.glob("*.usd*"))]
     frames = sum(len(t.clip) for t in takes)
     print(f"{len(takes)} takes, {frames} frames.\n")
-    parts: tuple[Callable[[Sequence[Take]], None], ...] = (print_presets, print_curve)
-    for part in parts:
-        part(takes)
+    print_alone(takes)
+    print_others(takes, given.others)
+    print_curve(takes)
+    print_presets(takes)
     print("**Share of variance off the flexion axis**, each take about its own mean.\n")
     table(("joint", "left", "right"), off_axis_shares([t.source for t in takes]))
     other = folder.parent / "mini"

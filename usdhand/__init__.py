@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from usdhand.reduce.rig import ReducedRig as ReducedRig
     from usdhand.reduce.rig import Relation as Relation
     from usdhand.reduce.settings import ReduceSettings as ReduceSettings
+    from usdhand.reduce.variation import Variation as Variation
     from usdhand.requests.base import Request as Request
     from usdhand.requests.check import CheckRequest as CheckRequest
     from usdhand.requests.compare import CompareRequest as CompareRequest
@@ -101,6 +102,7 @@ if TYPE_CHECKING:
     from usdhand.verbs.convert import write_new as write_new
     from usdhand.verbs.evaluate import measure_library as measure_library
     from usdhand.verbs.expand import expand as expand
+    from usdhand.verbs.expand import expand_motion as expand_motion
     from usdhand.verbs.expand import expand_onto as expand_onto
     from usdhand.verbs.fill import fill_fingers as fill_fingers
     from usdhand.verbs.fill import write_filled as write_filled
@@ -111,6 +113,7 @@ if TYPE_CHECKING:
     from usdhand.verbs.preview import Previewed as Previewed
     from usdhand.verbs.preview import preview_clips as preview_clips
     from usdhand.verbs.preview import write_preview as write_preview
+    from usdhand.verbs.reduce import fit_rig as fit_rig
     from usdhand.verbs.reduce import read_rig as read_rig
     from usdhand.verbs.reduce import reduce_hands as reduce_hands
     from usdhand.verbs.reduce import write_rig as write_rig
@@ -144,6 +147,7 @@ _HOME = {  # module -> its public names
     "usdhand.reduce.method": "Reduction apply_rig",
     "usdhand.reduce.rig": "ReducedRig Relation",
     "usdhand.reduce.settings": "ReduceSettings",
+    "usdhand.reduce.variation": "Variation",
     "usdhand.requests.base": "Request",
     "usdhand.requests.check": "CheckRequest",
     "usdhand.requests.compare": "CompareRequest",
@@ -166,12 +170,12 @@ _HOME = {  # module -> its public names
     "usdhand.verbs.compare": "compare",
     "usdhand.verbs.convert": "Converted convert retarget_hands write_new",
     "usdhand.verbs.evaluate": "measure_library",
-    "usdhand.verbs.expand": "expand expand_onto",
+    "usdhand.verbs.expand": "expand expand_motion expand_onto",
     "usdhand.verbs.fill": "fill_fingers write_filled",
     "usdhand.verbs.library": "BuildResult build_library",
     "usdhand.verbs.outcome": "Outcome Watch",
     "usdhand.verbs.preview": "Previewed preview_clips write_preview",
-    "usdhand.verbs.reduce": "read_rig reduce_hands write_rig",
+    "usdhand.verbs.reduce": "fit_rig read_rig reduce_hands write_rig",
     "usdhand.verbs.run": "run",
     "usdhand.verbs.splice": "parse_pin splice_hands write_spliced",
 }

@@ -13,7 +13,7 @@ from usdhand.reduce.evidence import Evidence
 from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.moments import Moments, pooled
 from usdhand.reduce.relate import Shape, residual_moments, told_by
-from usdhand.reduce.rig import relation_matrix
+from usdhand.reduce.rig import ReducedRig, relation_matrix
 from usdhand.reduce.settings import PRESETS, Choice
 
 # A ridge that serves takes left out about as well as the best one, whatever the count.
@@ -102,6 +102,13 @@ def error_curve(
             CurvePoint(count, own, pca, left[0] if whole else None, left[1] if whole else None)
         )
     return ErrorCurve(tuple(points), _presets(evidence), _knee(points, choice.measure))
+
+
+def rig_loss(rig: ReducedRig, evidence: Evidence) -> Loss:
+    """What a rig's relations lose on the motion that it was fitted to, limits apart."""
+    moments = evidence.moments
+    missed = residual_moments(relation_matrix(rig.relations), moments, moments)
+    return Loss.of(missed, evidence)
 
 
 def _losses(

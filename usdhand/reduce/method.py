@@ -18,7 +18,7 @@ from usdhand.reduce.moments import Moments
 from usdhand.reduce.rig import ReducedRig, Relation, relation_matrix
 from usdhand.reduce.search import thresholds_for_count, thresholds_for_error
 from usdhand.reduce.settings import Choice, Fit, Target, Thresholds
-from usdhand.reduce.variation import Residuals
+from usdhand.reduce.variation import Residuals, Variation
 
 
 @displayed(
@@ -183,19 +183,62 @@ def apply_rig(
     )
 
 
-def expand(rig: ReducedRig, free: Channels, clip: Clip, hands: Hands) -> Clip:
+def expand(
+    rig: ReducedRig, free: Channels, clip: Clip, hands: Hands, variation: Variation | None = None
+) -> Clip:
     """Put a rig's motion on a clip's hands: dependent channels follow from the free ones.
 
     ``clip`` gives the body and as many frames as ``free``; channels that its hands lack are left
     out, channels that the rig lacks keep the clip's motion.
+
+    Parameters
+    ----------
+    variation : motion to put back that the rig does not keep
+
+    Raises
+    ------
+    UsageError
+        if the rig and the clip have no channel in common, or the rig has no residuals to vary by.
     """
-    channels = rig.evaluate(free)
+    channels = rig.evaluate(free, varied(rig, len(free.values), clip.fps, variation))
     own = hands.encode(clip)
     there = set(own.names)
     shared = [name for name in channels.names if name in there]
     if not shared:
         raise UsageError(f"The rig and {clip.name} have no channel in common.")
     return hands.decode(own.replaced(channels.select(shared)), clip)
+
+
+def varied(
+    rig: ReducedRig, frames: int, fps: float, variation: Variation | None
+) -> Channels | None:
+    """What to add to a rig's dependent channels, (frames, channels) degrees; None for nothing."""
+    if variation is None or variation.amount == 0.0:
+        return None
+    if rig.residuals is None:
+        raise UsageError(
+            "The rig does not say what it leaves out, so there is nothing to vary by: reduce again "
+            "with this usdhand, or leave --variation away."
+        )
+    noise = rig.residuals.noise(frames, fps, variation.seed)
+    return Channels(rig.residuals.names, variation.amount * noise)
+
+
+def free_of(rig: ReducedRig, clip: Clip, source: Channels) -> Channels:
+    """The rig's free channels of a clip that may have nothing else, on the rig's turn.
+
+    Raises
+    ------
+    UsageError
+        if the clip's hands lack a free channel.
+    """
+    missing = sorted(set(rig.free) - set(source.names))
+    if missing:
+        raise UsageError(
+            f"The hands of {clip.name} lack the channel '{missing[0]}' that is free in the rig "
+            f"({len(missing)} such channels): fit a rig whose free channels they have."
+        )
+    return rig.on_turn(source.select(rig.free))
 
 
 def _thresholds(statistics: Statistics, target: Target, fit: Fit) -> Thresholds:

@@ -9,12 +9,34 @@ from typing import Self
 import numpy as np
 from scipy import fft
 
+from usdhand.display import displayed
+from usdhand.errors import UsageError
 from usdhand.motion.rotations import Array
 
 # Bands of frequency, from the first to the second, from the second to the third, ... to the end.
 EDGES_HZ = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 KEPT_SHARE = 0.99  # of the variance that is not kept
 LEAST_S = 32.0  # a shorter clip is cut out of noise of this length, which has all frequencies
+
+
+@displayed()
+@dataclass(frozen=True)
+class Variation:
+    """How much of the motion that a rig does not keep is put back: 1 is as much as there was.
+
+    Attributes
+    ----------
+    seed : another one is another motion; the same gives the same
+    """
+
+    amount: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.amount) and self.amount >= 0.0):
+            raise UsageError(f"A variation of {self.amount:g} is not possible: give 0 or more.")
+        if self.seed < 0:
+            raise UsageError(f"A seed of {self.seed} is not possible: give 0 or more.")
 
 
 def band_covariances(curves: Array, fps: float) -> Array:

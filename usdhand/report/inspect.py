@@ -10,7 +10,9 @@ from usdhand.anatomy.channels import is_flexion
 from usdhand.anatomy.hand import CharacterMap, HandMap
 from usdhand.motion import Clip
 from usdhand.problems import Problem
+from usdhand.reduce.rig import ReducedRig
 from usdhand.report.document import rounded
+from usdhand.report.reduce import relation_lines, relations_data
 from usdhand.report.text import problems_data, table
 
 
@@ -74,6 +76,19 @@ def map_data(clip: Clip, character: CharacterMap) -> dict[str, Any]:
     }
 
 
+def rig_result(rig: ReducedRig) -> dict[str, Any]:
+    """What follows what in a rig, and how well it was told."""
+    return {
+        "free_channels": len(rig.free),
+        "total_channels": len(rig.names),
+        "fit": rig.fit,
+        "measure": rig.measure or None,
+        "fitted_to": list(rig.sources),
+        "relations": relations_data(rig),
+        "held_channels": {name: rounded(value) for name, value in rig.held.items()},
+    }
+
+
 def summary(result: Mapping[str, Any], verbose: bool) -> str:
     """All files, one below the other."""
     return "\n".join(_text(file, verbose) for file in result["files"] if "error" not in file)
@@ -111,6 +126,9 @@ def _off_axis_shares(clip: Clip, hands: Hands) -> dict[str, float]:
 
 
 def _text(result: Mapping[str, Any], verbose: bool) -> str:
+    rig = _rig_lines(result["rig"]) if "rig" in result else []
+    if "joints" not in result:  # a rig without a character
+        return "\n".join([f"{result['path']}", *rig])
     skeleton = f"skeleton {result['skeleton']}, " if result["skeleton"] else ""
     lines = [
         f"{result['path']}",
@@ -137,7 +155,20 @@ def _text(result: Mapping[str, Any], verbose: bool) -> str:
         f"  {p['severity']}: {p['message']}" + (f" ({p['where']})" if p["where"] else "")
         for p in result["problems"]
     ]
-    return "\n".join(lines)
+    return "\n".join(lines + rig)
+
+
+def _rig_lines(rig: Mapping[str, Any]) -> list[str]:
+    relations = rig["relations"]
+    kinds = [r["kind"] for r in relations]
+    sources = rig["fitted_to"]
+    clips = f"{len(sources)} clips" if len(sources) > 1 else "".join(sources) or "no named clip"
+    head = (
+        f"  hand rig: {rig['free_channels']} of {rig['total_channels']} channels free, "
+        f"{kinds.count('linear')} follow, {kinds.count('constant')} constant; "
+        f"{rig['fit']} fit to {clips}"
+    )
+    return [head, *(f"    {line}" for line in relation_lines(relations))]
 
 
 def _hand_lines(result: Mapping[str, Any], verbose: bool) -> list[str]:

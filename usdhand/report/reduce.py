@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from usdhand.anatomy.hand import DIGITS
 from usdhand.reduce.curve import Loss, error_curve
 from usdhand.reduce.errors import Errors, pca_rms
 from usdhand.reduce.evidence import Evidence
@@ -54,6 +55,87 @@ def reduce_result(reduction: Reduction) -> dict[str, Any]:
         },
         "problems": problems_data(reduction.clip.problems),
     }
+
+
+def fit_result(rig: ReducedRig, evidence: Evidence) -> dict[str, Any]:
+    """Everything `reduce --fit-only` reports but the curve."""
+    moments = evidence.moments
+    return {
+        "free_channels": len(rig.free),
+        "total_channels": len(rig.names),
+        "frames": moments.frames,
+        "thresholds": {
+            "range_deg": rounded(rig.range_threshold),
+            "rmsd": rounded(rig.rmsd_threshold),
+        },
+        "fit": rig.fit,
+        "measure": rig.measure or None,
+        "fitted_to": list(rig.sources),
+        "relations": relations_data(rig),
+        "followed_to_root_over_threshold": followed_over(rig),
+        "held_channels": {name: rounded(value) for name, value in rig.held.items()},
+    }
+
+
+def fit_summary(result: Mapping[str, Any], verbose: bool) -> str:
+    """The rig, what it was fitted to, and the curve."""
+    shown = {**result, "channels": result["relations"]}
+    return "\n".join(
+        [
+            _rig_text(shown, verbose=False),
+            *(relation_lines(result["relations"]) if verbose else ()),
+            f"fitted to {len(result['fitted_to'])} clips, {result['frames']} frames; "
+            f"{written_to(result)}",
+            curve_text(result["curve"], verbose),
+        ]
+    )
+
+
+def relations_data(rig: ReducedRig) -> list[dict[str, Any]]:
+    """What follows what, and how well it was told."""
+    return [
+        {
+            "name": r.name,
+            "kind": r.kind,
+            "controllers": list(r.controllers),
+            "slopes": [rounded(s) for s in r.slopes],
+            "offset": None if r.kind == "free" else rounded(r.offset),
+            "fitted": fitted_data(r),
+        }
+        for r in rig.relations
+    ]
+
+
+def relation_lines(relations: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What follows what, in words."""
+    lines = []
+    for r in relations:
+        fitted = r["fitted"]
+        if r["kind"] == "free":
+            text = "is free"
+        elif r["kind"] == "constant":
+            text = f"stays at {r['offset']:.1f} deg"
+        else:
+            terms = " ".join(
+                f"{slope:+.2f} {channel_in_words(c)}"
+                for c, slope in zip(r["controllers"], r["slopes"], strict=True)
+            )
+            text = f"follows {terms}"
+        if r["kind"] != "free":
+            told = "" if fitted["told"] is None else f", {100 * fitted['told']:.0f} % told"
+            text += f" (RMS error {fitted['rms_error_deg']:.1f} deg{told})"
+        lines.append(f"{r['name']}, {channel_in_words(r['name'])}, {text}")
+    return lines
+
+
+def channel_in_words(channel: str) -> str:
+    """``riRingDIPy`` -> ``right ring DIP flexion``."""
+    side = "right" if channel.startswith("ri") else "left"
+    joint, letter = channel[2:-1], channel[-1]
+    digit = next((d for d in DIGITS if joint.startswith(d)), joint)
+    letters = "xzy" if digit == "Thumb" else "xyz"
+    motion = ("abduction", "flexion", "rotation")[letters.index(letter)]
+    return f"{side} {digit.lower()} {joint.removeprefix(digit)} {motion}"
 
 
 def curve_data(evidence: Evidence, settings: ReduceSettings) -> dict[str, Any]:

@@ -18,12 +18,14 @@ class ExpandRequest(Request):
     """Turn a reduced rig back into motion, on its own or another character.
 
     Dependent channels are computed from the free ones (also after someone edited those) and
-    baked, with the body, into a SkelAnimation.
+    baked, with the body, into a SkelAnimation. With --motion, the free ones are those of a clip
+    that need have nothing else.
 
     \b
     Examples:
       usdhand expand ok_rig.usda -o ok.usda
       usdhand expand ok_rig.usda --onto samples/characters/ben.usdc -o ben_ok.usda
+      usdhand expand show_rig.usdc --motion few_markers.usdc -o hands.usdc
     """
 
     verb: ClassVar[str] = "expand"
@@ -32,6 +34,18 @@ class ExpandRequest(Request):
     onto: Path | None = option(
         "Put the hands on this character, whatever its rig.", default=None, metavar="CHARACTER"
     )
+    motion: Path | None = option(
+        "Take the free channels from this clip instead, and make the rest of its hands.",
+        default=None,
+        metavar="CLIP",
+    )
+    variation: float = option(
+        "Put back so much of the motion that the rig does not keep, as noise with its spectrum "
+        "and correlation; 1 is as much as there was.",
+        default=0.0,
+        metavar="X",
+    )
+    seed: int = option("Another seed is another variation.", default=0, metavar="N", at_least=0)
     skel: str | None = shared.skel(
         "Path or name of the skeleton where there are several (with --onto: of CHARACTER)."
     )

@@ -17,9 +17,12 @@ from usdhand.requests.base import Request
 class InspectRequest(Request):
     """Show skeletons, timing, units, hands and problems of files.
 
+    Of a hand rig, also what follows what; with --plots as a picture of the hands.
+
     \b
-    Example:
+    Examples:
       usdhand inspect samples/characters samples/gestures/ok_01.usdc
+      usdhand inspect ok_rig.usda --plots pictures
     """
 
     verb: ClassVar[str] = "inspect"
@@ -27,3 +30,5 @@ class InspectRequest(Request):
     files: tuple[str, ...] = argument("Files, folders and wildcards.")
     skel: str | None = shared.skel()
     maps: tuple[Path, ...] = shared.maps()
+    plots: Path | None = shared.plots()
+    force: bool = shared.force("a plot")

@@ -27,6 +27,7 @@ class ReduceRequest(Request):
       usdhand reduce samples/gestures/ok_01.usdc -o ok_rig.usda
       usdhand reduce takes/*.usdc -o rigs/ --target-dofs 20 --fit least-squares
       usdhand reduce new_take.usdc --rig rigs/take_01.rig.usdc -o new_rig.usdc
+      usdhand reduce takes/*.usdc --fit-only --target-dofs 15 -o show_rig.usdc
     """
 
     verb: ClassVar[str] = "reduce"
@@ -38,6 +39,11 @@ class ReduceRequest(Request):
     settings: ReduceSettings = settings(ReduceSettings())
     rig: Path | None = option(
         "Apply the relations of this rig instead of fitting one.", default=None, metavar="RIG"
+    )
+    fit_only: bool = option(
+        "Write one file with the relations alone, to apply with --rig; takes in any number of "
+        "clips, one at a time.",
+        default=False,
     )
     side: shared.Sides = shared.side()
     flatten: bool = shared.flatten()

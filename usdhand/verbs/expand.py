@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from usdhand.anatomy.channels import Channels, Hands
 from usdhand.errors import UsageError
-from usdhand.formats.files import read_any
+from usdhand.formats.files import read_any, read_clip
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.formats.usd.rig import StoredRig
 from usdhand.motion import Clip
 from usdhand.motion.resample import resample_like
-from usdhand.problems import Problem
+from usdhand.problems import Problem, listed
 from usdhand.reduce.method import expand as expand_channels
+from usdhand.reduce.method import free_of
+from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.variation import Variation
 from usdhand.report.expand import expand_result, summary
 from usdhand.requests.expand import ExpandRequest
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.verbs.clips import find_hands, misleading_names, write_clip
 from usdhand.verbs.outcome import Journal, Outcome
+
+# A channel that changes by less over a clip is still.
+STILL_DEG = 0.01
 
 
 def expand(
@@ -29,6 +39,7 @@ def expand(
     skel: str | None = None,
     *,
     refresh: bool = False,
+    variation: Variation | None = None,
 ) -> Clip:
     """Motion of a rig file: dependent channels computed from its free ones.
 
@@ -44,11 +55,12 @@ def expand(
     InputError
         if the file cannot be read, or holds no rig, several, or one that contradicts itself.
     UsageError
-        if ``refresh`` is wanted of a file that does not refer to the clip.
+        if ``refresh`` is wanted of a file that does not refer to the clip, or there is to be a
+        variation, and the rig does not say of what.
     HandNotFoundError
         if its character has no hands.
     """
-    return _expanded(usd_rig.read_stored_rig(path, skel), conventions, refresh)
+    return _expanded(usd_rig.read_stored_rig(path, skel), conventions, refresh, variation)
 
 
 def expand_onto(
@@ -58,6 +70,7 @@ def expand_onto(
     conventions: Conventions | None = None,
     *,
     rig_skel: str | None = None,
+    variation: Variation | None = None,
 ) -> Clip:
     """Motion of a rig file's hands on another character, in the rig's time.
 
@@ -74,31 +87,52 @@ def expand_onto(
     InputError
         if a file cannot be read, or holds no rig, several, or one that contradicts itself.
     UsageError
-        if the target has several skeletons and none is chosen, or its hands have no channel of the
-        rig.
+        if the target has several skeletons and none is chosen, its hands have no channel of the
+        rig, or there is to be a variation, and the rig does not say of what.
     HandNotFoundError
         if the target has no hands.
     """
     stored, chosen = _chosen(path, skel, rig_skel)
-    return _expanded_onto(stored, target, skel, conventions, chosen)
+    target = target if isinstance(target, Clip) else _target(target, skel, chosen)
+    return _onto(stored.rig, stored.free, stored.clip, target, skel, conventions, variation)
+
+
+def expand_motion(
+    rig: ReducedRig,
+    motion: Clip,
+    target: Clip | str | Path | None = None,
+    skel: str | None = None,
+    conventions: Conventions | None = None,
+    *,
+    variation: Variation | None = None,
+) -> Clip:
+    """Motion whose free channels are those of a clip, and whose other ones a rig makes of them.
+
+    Parameters
+    ----------
+    motion : a clip of which only the free channels are used, such as a capture with few markers
+    target : another character to put the hands on, see `expand_onto`; the clip's own if None
+
+    Raises
+    ------
+    UsageError
+        if the clip's hands lack a free channel, or as `expand_onto`.
+    HandNotFoundError
+        if a clip has no hands.
+    """
+    free, own = _free_channels(rig, motion, conventions)
+    if target is None:
+        return expand_channels(rig, free, motion, own, variation)
+    return _onto(rig, free, motion, target, skel, conventions, variation)
 
 
 def run(request: ExpandRequest, journal: Journal) -> Outcome:
-    """Bake a rig's motion over its own input, or over another character."""
-    rig, onto, skel = request.rig, request.onto, request.skel
+    """Bake a rig's motion over its own input, over a clip, or over another character."""
+    variation = Variation(request.variation, request.seed)
     conventions = load_conventions(*request.maps)
-    inputs = [rig] if onto is None else [rig, onto]
+    inputs = [p for p in (request.rig, request.motion, request.onto) if p is not None]
     check_output(request.output, inputs, request.force, USD_SUFFIXES)
-    if onto is None:
-        if request.rig_skel is not None:
-            raise UsageError("--rig-skel is for --onto; without it, --skel chooses the rig.")
-        stored = usd_rig.read_stored_rig(rig, skel)
-        motion = _expanded(stored, conventions, request.refresh)
-    else:
-        if request.refresh:
-            raise UsageError("--refresh has no effect with --onto: leave one of them out.")
-        stored, chosen = _chosen(rig, skel, request.rig_skel)
-        motion = _expanded_onto(stored, onto, skel, conventions, chosen)
+    rig, motion = _baked(request, journal, conventions, variation)
     journal.about(motion.origin.path, motion.problems, "warning")
     journal.about(motion.origin.path, misleading_names(motion, conventions), "warning")
     if not request.dry_run:
@@ -115,17 +149,82 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
 
     def report() -> dict[str, Any]:
         output = None if request.dry_run else str(request.output)
-        return {"output": output} | expand_result(motion, len(stored.rig.free))
+        return {"output": output} | expand_result(motion, rig, request.motion is not None)
 
     written = () if request.dry_run else (request.output,)
     return Outcome(request, (*inputs, *request.maps), report, summary, written=written)
 
 
-def _expanded(stored: StoredRig, conventions: Conventions | None, refresh: bool) -> Clip:
+def _baked(
+    request: ExpandRequest,
+    journal: Journal,
+    conventions: Conventions | None,
+    variation: Variation,
+) -> tuple[ReducedRig, Clip]:
+    onto, skel = request.onto, request.skel
+    if request.motion is not None:
+        if request.refresh:
+            raise UsageError("--refresh has no effect with --motion: leave one of them out.")
+        rig = usd_rig.read_rig(request.rig, request.rig_skel)
+        clip = read_clip(request.motion, skel if onto is None else None)
+        journal.about(request.motion, _doubts(rig, clip, conventions), "warning")
+        return rig, expand_motion(rig, clip, onto, skel, conventions, variation=variation)
+    if onto is None:
+        if request.rig_skel is not None:
+            raise UsageError("--rig-skel is for --onto; without it, --skel chooses the rig.")
+        stored = usd_rig.read_stored_rig(request.rig, skel)
+        return stored.rig, _expanded(stored, conventions, request.refresh, variation)
+    if request.refresh:
+        raise UsageError("--refresh has no effect with --onto: leave one of them out.")
+    stored, chosen = _chosen(request.rig, skel, request.rig_skel)
+    rig, free, clip = stored.rig, stored.free, stored.clip
+    return rig, _onto(rig, free, clip, _target(onto, skel, chosen), skel, conventions, variation)
+
+
+def _free_channels(
+    rig: ReducedRig, clip: Clip, conventions: Conventions | None
+) -> tuple[Channels, Hands]:
+    hands = find_hands(clip, conventions)
+    return free_of(rig, clip, hands.encode(clip)), hands
+
+
+def _doubts(rig: ReducedRig, clip: Clip, conventions: Conventions | None) -> Iterator[Problem]:
+    """What speaks against taking a clip's free channels at their word."""
+    free, _ = _free_channels(rig, clip, conventions)
+    curves = dict(zip(free.names, free.values.T, strict=True))
+    still = [name for name, curve in curves.items() if np.ptp(curve) < STILL_DEG]
+    if still:
+        yield Problem(
+            "still-free-channels",
+            f"{len(still)} of the rig's {len(free)} free channels do not move in this clip, and "
+            f"what follows them stays still with them: {listed(still)}",
+            severity="warning",
+        )
+    limits = {r.name: r.limits for r in rig.relations if r.limits is not None}
+    beyond = [
+        name
+        for name, curve in curves.items()
+        if name in limits and (curve.min() < limits[name].low or curve.max() > limits[name].high)
+    ]
+    if beyond:
+        yield Problem(
+            "beyond-limits",
+            f"{len(beyond)} free channels go beyond what the rig was fitted to and a hand can do; "
+            f"what follows them is held within its own limits: {listed(beyond)}",
+            severity="warning",
+        )
+
+
+def _expanded(
+    stored: StoredRig,
+    conventions: Conventions | None,
+    refresh: bool,
+    variation: Variation | None,
+) -> Clip:
     hands = usd_rig.with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
     if refresh:
-        return _refreshed(stored, conventions)
-    motion = expand_channels(stored.rig, stored.free, stored.clip, hands)
+        return _refreshed(stored, conventions, variation)
+    motion = expand_channels(stored.rig, stored.free, stored.clip, hands, variation)
     joints = stored.clip.skeleton.joints
     moved = {joints[j] for frames in hands.frames.values() for j in frames.links.moving}
     changed = stored.source.change(moved) if stored.source else None
@@ -135,7 +234,9 @@ def _expanded(stored: StoredRig, conventions: Conventions | None, refresh: bool)
     return replace(motion, problems=(*motion.problems, problem))
 
 
-def _refreshed(stored: StoredRig, conventions: Conventions | None) -> Clip:
+def _refreshed(
+    stored: StoredRig, conventions: Conventions | None, variation: Variation | None
+) -> Clip:
     """The hands of a rig on the body that its own source has now."""
     source = stored.source
     if source is None:
@@ -145,7 +246,7 @@ def _refreshed(stored: StoredRig, conventions: Conventions | None) -> Clip:
         )
     body = resample_like(read_any(source.path, source.skeleton)[0], stored.clip)
     hands = usd_rig.with_stored_frames(find_hands(body, conventions), stored.frames)
-    return expand_channels(stored.rig, stored.free, body, hands)
+    return expand_channels(stored.rig, stored.free, body, hands, variation)
 
 
 def _chosen(path: str | Path, skel: str | None, rig_skel: str | None) -> tuple[StoredRig, bool]:
@@ -154,16 +255,19 @@ def _chosen(path: str | Path, skel: str | None, rig_skel: str | None) -> tuple[S
     return usd_rig.read_stored_rig(path, skel if names_one else rig_skel, "--rig-skel"), names_one
 
 
-def _expanded_onto(
-    stored: StoredRig,
+def _onto(
+    rig: ReducedRig,
+    free: Channels,
+    clip: Clip,
     target: Clip | str | Path,
     skel: str | None,
     conventions: Conventions | None,
-    of_rig: bool,
+    variation: Variation | None,
 ) -> Clip:
-    body = target if isinstance(target, Clip) else _target(target, skel, of_rig)
-    body = resample_like(body, stored.clip)
-    return expand_channels(stored.rig, stored.free, body, find_hands(body, conventions))
+    """Put the hands on the target, in the time of the clip that the free channels are of."""
+    body = target if isinstance(target, Clip) else read_any(target, skel)[0]
+    body = resample_like(body, clip)
+    return expand_channels(rig, free, body, find_hands(body, conventions), variation)
 
 
 def _target(target: str | Path, skel: str | None, of_rig: bool) -> Clip:

@@ -6,9 +6,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from usdhand.errors import HandNotFoundError, UsdHandError
+from usdhand.errors import HandNotFoundError, UsageError, UsdHandError
 from usdhand.formats.files import animation_names, read_any, read_character
-from usdhand.report.inspect import inspect_result, summary
+from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.formats.usd.rig_library import rig_in
+from usdhand.reduce.rig import ReducedRig
+from usdhand.report.inspect import inspect_result, rig_result, summary
+from usdhand.report.plots import rigs
+from usdhand.report.plots.style import check_plots
 from usdhand.requests.inspect import InspectRequest
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.verbs.clips import find_hands
@@ -21,28 +26,51 @@ def run(request: InspectRequest, journal: Journal) -> Outcome:
     """Look into every file; exit 4 if one has no hands, or as the worst of its errors says."""
     paths = find_files(request.files)
     conventions = load_conventions(*request.maps)
+    if request.plots is not None:
+        check_plots(request.plots, rigs.NAMES, request.force)
     results: list[dict[str, Any]] = []
+    found_rigs: list[ReducedRig] = []
     code = 0
     each = partial(_inspect, skel=request.skel, conventions=conventions)
-    for path, found in journal.each(each_apart(each, paths), "inspecting", len(paths)):
-        if isinstance(found, UsdHandError):
-            journal.fail(found)
-            code = max(code, found.exit_code)
-            found = {"error": str(found)}
+    for path, done in journal.each(each_apart(each, paths), "inspecting", len(paths)):
+        if isinstance(done, UsdHandError):
+            journal.fail(done)
+            code = max(code, done.exit_code)
+            found: dict[str, Any] = {"error": str(done)}
+        else:
+            found, rig = done
+            found_rigs += [rig] if rig else []
         if "hand_error" in found:
             journal.fail(HandNotFoundError(found["hand_error"]))
             code = max(code, HandNotFoundError.exit_code)
         results.append({"path": str(path)} | found)
+    if request.plots is not None and len(found_rigs) != 1:
+        raise UsageError(
+            f"--plots draws the hands of one rig; {len(found_rigs)} of these files hold a rig."
+        )
     return Outcome(
-        request, (*paths, *request.maps), lambda: {"files": results}, summary, exit_code=code
+        request,
+        (*paths, *request.maps),
+        lambda: {"files": results},
+        summary,
+        figures=lambda: rigs.figures(found_rigs[0]),
+        exit_code=code,
     )
 
 
-def _inspect(path: Path, skel: str | None, conventions: Conventions | None) -> dict[str, Any]:
+def _inspect(
+    path: Path, skel: str | None, conventions: Conventions | None
+) -> tuple[dict[str, Any], ReducedRig | None]:
+    found = rig_in(path, skel) if path.suffix.lower() in USD_SUFFIXES else None
+    rig, bound = found or (None, True)
+    shown = {"rig": rig_result(rig)} if rig else {}
+    if not bound:  # fitted without a character
+        return shown, rig
     names = animation_names(path)
     clip, animated = read_any(path, skel) if len(names) < 2 else (read_character(path, skel), False)
     more = {"animations": list(names)} if len(names) > 1 else {}
     try:
-        return inspect_result(clip, find_hands(clip, conventions), animated) | more
+        return inspect_result(clip, find_hands(clip, conventions), animated) | more | shown, rig
     except HandNotFoundError as error:
-        return inspect_result(clip, None, animated) | more | {"hand_error": str(error)}
+        own = inspect_result(clip, None, animated) | more
+        return own | {"hand_error": str(error)} | shown, rig

@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from usdhand.anatomy import SIDES, Side
+from usdhand.anatomy import SIDES, Hands, Side
+from usdhand.anatomy.channels import Channels
 from usdhand.errors import OutputError, UsageError
 from usdhand.formats.files import read_clip
-from usdhand.formats.output import check_folder, check_outputs, make_folder
+from usdhand.formats.output import check_folder, check_output, check_outputs, make_folder
 from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
-from usdhand.motion import Clip
+from usdhand.formats.usd.rig_library import write_fitted_rig
+from usdhand.motion import Clip, Skeleton
 from usdhand.problems import Problem
 from usdhand.reduce.evidence import Evidence, gather
 from usdhand.reduce.method import Reduction, apply_rig, fit_to
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.settings import Choice, ReduceSettings
+from usdhand.report.plots import curve
 from usdhand.report.plots import reducing as plotting
 from usdhand.report.plots.style import check_plots
-from usdhand.report.reduce import curve_data, reduce_result, summary
+from usdhand.report.reduce import curve_data, fit_result, fit_summary, reduce_result, summary
 from usdhand.requests.reduce import ReduceRequest
 from usdhand.requests.shared import sides
 from usdhand.rigs import Conventions, load_conventions
@@ -100,7 +103,7 @@ def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
 
 
 def write_rig(
-    reduction: Reduction,
+    reduction: Reduction | ReducedRig,
     output: str | Path,
     *,
     flatten: bool = False,
@@ -109,7 +112,8 @@ def write_rig(
 ) -> tuple[Problem, ...]:
     """Write a reduced clip as a rig over the file it was read from.
 
-    A clip that was made in memory becomes a character with its own motion first.
+    A clip that was made in memory becomes a character with its own motion first. A rig without a
+    clip (see `fit_rig`) is written alone, to be applied to clips.
 
     Returns what one file, if it was to be one, could not keep.
 
@@ -120,6 +124,9 @@ def write_rig(
     OutputError
         if the output is refused or cannot be written; nothing is left behind then.
     """
+    if isinstance(reduction, ReducedRig):
+        write_fitted_rig(reduction, output, force=force)
+        return ()
     character = character_under(reduction.clip, animated=True)
     return usd_rig.write_rig(
         reduction,
@@ -152,8 +159,56 @@ def _same_bind(a: Clip, b: Clip) -> bool:
     return a.skeleton is b.skeleton or np.allclose(a.skeleton.bind, b.skeleton.bind, atol=1e-4)
 
 
+def fit_rig(
+    clips: Sequence[Clip | str | Path],
+    settings: ReduceSettings | None = None,
+    *,
+    conventions: Conventions | None = None,
+    sides: Sequence[Side] = SIDES,
+) -> ReducedRig:
+    """Fit one rig to all clips, one at a time.
+
+    Clips of one character have the anatomical frames of its first.
+
+    Parameters
+    ----------
+    clips : clips, or files, which are read when their turn comes and given up at once
+
+    Raises
+    ------
+    UsageError
+        if the settings contradict each other.
+    HandNotFoundError
+        if a clip has no hands.
+    InputError
+        if there is no clip, one has a single frame, or their hands have different joints.
+    QualityError
+        if the largest error that is asked for is not above 0.
+    """
+    values = (clip if isinstance(clip, Clip) else read_clip(clip) for clip in clips)
+    evidence = gather(_encoded(values, conventions, sides))
+    return fit_evidence(evidence, settings or ReduceSettings())
+
+
+def _encoded(
+    clips: Iterable[Clip], conventions: Conventions | None, sides: Sequence[Side]
+) -> Iterator[tuple[Clip, Hands, Channels]]:
+    """Clips with their hands and channels, one at a time."""
+    known: dict[tuple[str, ...], list[tuple[Skeleton, Hands]]] = {}
+    for clip in clips:
+        own = known.setdefault(clip.skeleton.joints, [])
+        skeleton = clip.skeleton
+        hands = next((h for s, h in own if np.allclose(s.bind, skeleton.bind, atol=1e-4)), None)
+        if hands is None:
+            hands = find_hands(clip, conventions, sides)
+            own.append((skeleton, hands))
+        yield clip, hands, hands.encode(clip)
+
+
 def run(request: ReduceRequest, journal: Journal) -> Outcome:
     """Fit one rig to all clips, or apply a fitted one, and write a rig over each clip."""
+    if request.fit_only:
+        return _fit_only(request, journal)
     paths = find_files(request.clips)
     outputs = _outputs(paths, request.output)
     inputs = [*paths, *([request.rig] if request.rig else []), *request.maps]
@@ -199,8 +254,47 @@ def run(request: ReduceRequest, journal: Journal) -> Outcome:
         tuple(inputs),
         report,
         summary,
-        figures=lambda: plotting.figures(reductions),
+        figures=lambda: plotting.figures(reductions, request.settings),
         written=() if request.dry_run else tuple(outputs),
+    )
+
+
+def _fit_only(request: ReduceRequest, journal: Journal) -> Outcome:
+    """Fit one rig to all clips and write its relations alone."""
+    paths = find_files(request.clips)
+    if request.rig is not None:
+        raise UsageError("--rig applies a rig as it is; --fit-only fits one.")
+    if request.flatten:
+        raise UsageError("--fit-only writes one file without a character; --flatten has no use.")
+    _check_fitting(request)
+    check_output(request.output, [*paths, *request.maps], request.force, USD_SUFFIXES)
+    if request.plots is not None:
+        check_plots(request.plots, curve.NAMES, request.force)
+
+    def reading() -> Iterator[Clip]:
+        for path in journal.each(paths, "reading"):
+            clip = read_clip(path, request.skel)
+            journal.about(clip.origin.path, clip.problems, "warning")
+            yield replace(clip, source=None)
+
+    conventions = load_conventions(*request.maps)
+    evidence = gather(_encoded(reading(), conventions, sides(request.side)))
+    rig = fit_evidence(evidence, request.settings)
+    if not request.dry_run:
+        write_fitted_rig(rig, request.output, force=request.force)
+
+    def report() -> dict[str, Any]:
+        output = None if request.dry_run else str(request.output)
+        by_count = curve_data(evidence, request.settings)
+        return fit_result(rig, evidence) | {"output": output, "curve": by_count}
+
+    return Outcome(
+        request,
+        (*paths, *request.maps),
+        report,
+        fit_summary,
+        figures=lambda: curve.figures(rig, evidence, request.settings),
+        written=() if request.dry_run else (request.output,),
     )
 
 

@@ -146,6 +146,11 @@ def read_stored_rig(path: str | Path, skel: str | None = None, option: str = "--
     prim = find_rig(stage, path, skel, option)
     rig = _relations(prim, path)
     found = _skeleton_path(prim)
+    if found is None and not prim.GetRelationship("usdhand:skeleton"):
+        raise InputError(
+            f"{path}: the rig {prim.GetPath()} was fitted without a character and has no "
+            "motion of its own; 'usdhand expand --motion' takes the free channels from a clip."
+        )
     if found is None:
         raise InputError(f"{path}: the skeleton of the rig {prim.GetPath()} does not exist.")
     skeleton = stage.GetPrimAtPath(found)
@@ -203,6 +208,8 @@ def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Problem]:
     seen: dict[str | None, str] = {}
     for prim in rig_prims(stage):
         where, skeleton = str(prim.GetPath()), _skeleton_path(prim)
+        if not prim.GetRelationship("usdhand:skeleton"):
+            skeleton = f"none, {where}"  # fitted without a character
         if skeleton is None:
             yield Problem("rig-skeleton", "the rig's skeleton is not on the stage", where, "error")
         elif skeleton in seen:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from pxr import Sdf, Vt
 from usdhand.formats.hashing import file_hash
 from usdhand.motion.rotations import Array
 from usdhand.reduce.method import Reduction
-from usdhand.reduce.rig import Relation
+from usdhand.reduce.rig import ReducedRig, Relation
 from usdhand.reduce.variation import EDGES_HZ, Residuals
 
 VERSION = 1
@@ -26,25 +27,11 @@ def author_rig(
 ) -> None:
     """Write a rig as a Scope at ``path``: explicit custom attributes, typed by the schema."""
     rig, clip = reduction.rig, reduction.clip
-    prim = Sdf.CreatePrimInLayer(layer, path)
-    prim.specifier = Sdf.SpecifierDef
-    prim.typeName = "Scope"
-    schemas = Sdf.TokenListOp()
-    instances = [f"HandChannelAPI:{name}" for name in (*rig.names, *rig.held)]
-    schemas.prependedItems = ["HandRigAPI", *instances]
-    prim.SetInfo("apiSchemas", schemas)
-
+    times = [float(t) for t in clip.time_codes]
+    curves = dict(zip(reduction.free.names, reduction.free.values.T, strict=True))
+    prim = author_relations(layer, path, rig, times, curves)
     skeleton = Sdf.RelationshipSpec(prim, "usdhand:skeleton", custom=True)
     skeleton.targetPathList.explicitItems = [skeleton_path]
-    _set(prim, "usdhand:version", _TYPES.Int, VERSION)
-    _set(prim, "usdhand:fit", _TYPES.Token, rig.fit)
-    _set(prim, "usdhand:rangeThreshold", _TYPES.Double, rig.range_threshold)
-    _set(prim, "usdhand:rmsdThreshold", _TYPES.Double, rig.rmsd_threshold)
-    if rig.measure:
-        _set(prim, "usdhand:measure", _TYPES.Token, rig.measure)
-    if rig.residuals is not None:
-        _author_residuals(prim, rig.residuals)
-    _set(prim, "usdhand:sources", _TYPES.StringArray, Vt.StringArray(list(rig.sources)))
     if clip.origin.path is not None:
         _set(prim, "usdhand:sourceHash", _TYPES.String, file_hash(clip.origin.path))
     for side, frames in reduction.hands.frames.items():
@@ -62,20 +49,49 @@ def author_rig(
         ):
             quaternions = Vt.QuatdArray.FromNumpy(np.ascontiguousarray(values))
             _set(prim, f"usdhand:{side}:{name}", _TYPES.QuatdArray, quaternions)
-    times = [float(t) for t in clip.time_codes]
-    curves = dict(zip(reduction.free.names, reduction.free.values.T, strict=True))
+
+
+def author_relations(
+    layer: Sdf.Layer,
+    path: Sdf.Path,
+    rig: ReducedRig,
+    times: Sequence[float] = (),
+    curves: Mapping[str, Array] | None = None,
+) -> Sdf.PrimSpec:
+    """Write what a rig is, whatever character it is for.
+
+    Free channels without a curve are at the middle of their limits.
+    """
+    prim = Sdf.CreatePrimInLayer(layer, path)
+    prim.specifier = Sdf.SpecifierDef
+    prim.typeName = "Scope"
+    schemas = Sdf.TokenListOp()
+    instances = [f"HandChannelAPI:{name}" for name in (*rig.names, *rig.held)]
+    schemas.prependedItems = ["HandRigAPI", *instances]
+    prim.SetInfo("apiSchemas", schemas)
+
+    _set(prim, "usdhand:version", _TYPES.Int, VERSION)
+    _set(prim, "usdhand:fit", _TYPES.Token, rig.fit)
+    _set(prim, "usdhand:rangeThreshold", _TYPES.Double, rig.range_threshold)
+    _set(prim, "usdhand:rmsdThreshold", _TYPES.Double, rig.rmsd_threshold)
+    if rig.measure:
+        _set(prim, "usdhand:measure", _TYPES.Token, rig.measure)
+    if rig.residuals is not None:
+        _author_residuals(prim, rig.residuals)
+    _set(prim, "usdhand:sources", _TYPES.StringArray, Vt.StringArray(list(rig.sources)))
     for relation in rig.relations:
-        _author_channel(layer, prim, relation, times, curves.get(relation.name))
+        _author_channel(layer, prim, relation, times, (curves or {}).get(relation.name))
     for name, value in rig.held.items():
         _set_channel(prim, name, "kind", _TYPES.Token, HELD)
         _set_channel(prim, name, "value", _TYPES.Double, value)
+    return prim
 
 
 def _author_channel(
     layer: Sdf.Layer,
     prim: Sdf.PrimSpec,
     relation: Relation,
-    times: list[float],
+    times: Sequence[float],
     curve: Array | None,
 ) -> None:
     name = relation.name
@@ -92,6 +108,10 @@ def _author_channel(
         attribute = _set_channel(prim, name, "value", _TYPES.Double, None)
         for time, value in zip(times, curve.tolist(), strict=True):
             layer.SetTimeSample(attribute.path, time, value)
+        return
+    if relation.kind == "free":
+        value = relation.limits.middle if relation.limits else 0.0
+        _set_channel(prim, name, "value", _TYPES.Double, value)
         return
     _set_channel(prim, name, "rmsError", _TYPES.Double, relation.rms_error)
     if relation.kind == "constant":

@@ -16,15 +16,21 @@ from usdhand.reduce.fit import Statistics
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.rig import Relation
 from usdhand.reduce.search import errors_by_count
-from usdhand.reduce.settings import Fit
-from usdhand.report.plots import style
+from usdhand.reduce.settings import Fit, ReduceSettings
+from usdhand.report.plots import curve, style
 from usdhand.report.plots.style import BLACK, BLUE, GREY, LIGHT, ORANGE, SKY, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-NAMES = ("reduce_followers", "reduce_histograms", "reduce_curves", "reduce_errors")
+NAMES = (
+    "reduce_followers",
+    "reduce_histograms",
+    "reduce_curves",
+    "reduce_errors",
+    *curve.NAMES,
+)
 MOST_FOLLOWERS, MOST_CURVES = 12, 6
 SCATTER_POINTS = 600
 SEEN_DEG = 0.01  # a smaller error is not worth a plot
@@ -38,7 +44,9 @@ BIN_WIDTHS = (
 )  # of ranges in degrees, the first that gives few bars
 
 
-def figures(reductions: Sequence[Reduction]) -> dict[str, Figure]:
+def figures(
+    reductions: Sequence[Reduction], settings: ReduceSettings | None = None
+) -> dict[str, Figure]:
     """All plots of a rig by name; those with nothing to show are left out."""
     found = {
         "reduce_followers": followers(reductions),
@@ -46,7 +54,9 @@ def figures(reductions: Sequence[Reduction]) -> dict[str, Figure]:
         "reduce_curves": curves(reductions),
         "reduce_errors": errors(reductions),
     }
-    return {name: figure for name, figure in found.items() if figure is not None}
+    rig, evidence = reductions[0].rig, reductions[0].evidence
+    more = {} if evidence is None else curve.figures(rig, evidence, settings or ReduceSettings())
+    return {name: figure for name, figure in found.items() if figure is not None} | more
 
 
 @styled

@@ -1,0 +1,78 @@
+"""The error against the number of free channels, in degrees and millimetres, PCA's beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from usdhand.reduce.curve import CurvePoint, ErrorCurve, Loss, error_curve, rig_loss
+from usdhand.reduce.evidence import Evidence
+from usdhand.reduce.rig import ReducedRig
+from usdhand.reduce.settings import ReduceSettings
+from usdhand.report.plots import style
+from usdhand.report.plots.style import BLACK, BLUE, GREY, ORANGE, SKY, YELLOW, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+NAMES = ("reduce_curve",)
+UNITS = {"deg": "RMS error over all channels, deg", "mm": "RMS error of the fingertips, mm"}
+
+
+def figures(rig: ReducedRig, evidence: Evidence, settings: ReduceSettings) -> dict[str, Figure]:
+    """The plot of a fit by name."""
+    curve = error_curve(evidence, settings.choice, settings.controllers)
+    return {"reduce_curve": draw(rig, evidence, curve)}
+
+
+@styled
+def draw(rig: ReducedRig, evidence: Evidence, curve: ErrorCurve) -> Figure:
+    """Two panels: degrees and millimetres."""
+    figure, panels = style.new_figure(
+        "What the best channels lose, by how many stay free", (9.5, 4.0), 1, 2
+    )
+    for panel, unit in zip(panels, UNITS, strict=True):
+        _panel(panel, curve, unit)
+        own = rig_loss(rig, evidence).by(unit)
+        label = f"this rig: {len(rig.free)} free, {own:.2f} {unit}"
+        panel.plot([len(rig.free)], [own], "o", color=ORANGE, label=label)
+        panel.axvline(
+            curve.suggested, color=YELLOW, linewidth=0.9, label=f"suggested: {curve.suggested}"
+        )
+        panel.set_xlim(0, len(rig.names))
+        panel.set_ylim(bottom=0)
+        panel.set_xlabel("free channels")
+        panel.set_ylabel(UNITS[unit])
+        panel.legend(loc="upper right")
+    return figure
+
+
+def _panel(panel: Axes, curve: ErrorCurve, unit: str) -> None:
+    points = curve.points
+    parts: tuple[tuple[str, str, str, str], ...] = (
+        ("fitted", "-", BLUE, "best channels, fitted"),
+        ("left_out", "-", SKY, "best channels, takes left out"),
+        ("pca", "--", BLACK, "PCA, fitted"),
+        ("pca_left_out", "--", GREY, "PCA, takes left out"),
+    )
+    for name, line, colour, label in parts:
+        counts, errors = _known(points, name, unit)
+        if len(counts):
+            panel.plot(counts, errors, line, color=colour, label=label)
+    for number, (preset, (count, loss)) in enumerate(curve.presets.items()):
+        label = "presets 1 to 4, fitted" if number == 0 else "_"
+        panel.plot([count], [loss.by(unit)], "s", color=BLACK, markersize=4, label=label)
+        panel.annotate(
+            str(preset), (count, loss.by(unit)), (3, 3), textcoords="offset points", fontsize=7
+        )
+
+
+def _known(points: Sequence[CurvePoint], name: str, unit: str) -> tuple[list[int], list[float]]:
+    losses: list[tuple[int, Loss | None]] = [(p.channels, getattr(p, name)) for p in points]
+    there = [(count, loss.by(unit)) for count, loss in losses if loss is not None]
+    counts, errors = [c for c, _ in there], [e for _, e in there]
+    assert np.isfinite(errors).all()
+    return counts, errors
