@@ -23,7 +23,8 @@ from usdhand import find_hands, read_clip
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate_rotations
-from usdhand.reduce.method import apply_rig, fit_rig
+from usdhand.reduce.evidence import gather
+from usdhand.reduce.method import apply_rig, fit_rig, fit_to
 from usdhand.reduce.settings import PRESETS, Target
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "gestures" / "ok_01.usdc"
@@ -76,6 +77,9 @@ def main() -> None:
     encode_s, source = timed(repeat, lambda: hands.encode(clip))
     target = Target(PRESETS[4])
     fit_s, rig = timed(repeat, lambda: fit_rig([clip], [hands], target, sources=[source]))
+    evidence_s, evidence = timed(repeat, lambda: gather([(clip, hands, source)]))
+    asked = Target(free_channels=15)
+    best_s, _ = timed(repeat, lambda: fit_to(evidence, asked, "least-squares"))
     apply_s, reduction = timed(repeat, lambda: apply_rig(rig, clip, hands, source))
     decode_s, _ = timed(repeat, lambda: reduction.motion)
     total = frames_s + encode_s + fit_s + apply_s + decode_s
@@ -96,6 +100,8 @@ def main() -> None:
         ("find hands and frames", frames_s),
         ("encode", encode_s),
         ("fit (preset 4)", fit_s),
+        ("of that, gather covariances, fingertips' Jacobians, spectra", evidence_s),
+        ("choose the 15 best channels instead", best_s),
         ("apply, errors in degrees and mm", apply_s),
         ("decode the reduced motion", decode_s),
         ("**all**", total),

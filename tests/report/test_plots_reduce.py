@@ -9,12 +9,13 @@ from conftest import REPOSITORY
 
 import usdhand
 from usdhand.motion import Clip
+from usdhand.reduce.curve import error_curve
 from usdhand.reduce.errors import pca_rms
 from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.search import errors_by_count, thresholds_for_count
 from usdhand.reduce.settings import ReduceSettings
-from usdhand.report.plots import reducing, style
+from usdhand.report.plots import reducing, rigs, style
 
 SAMPLES = REPOSITORY / "samples"
 BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
@@ -139,6 +140,38 @@ def test_error_against_number_of_channels(reduction: Reduction) -> None:
     assert bound[20] == pytest.approx(pca_rms(own, 20))
     [point] = next(xy for label, xy in drawn.items() if label.startswith("this rig"))
     assert point.tolist() == pytest.approx([len(reduction.rig.free), reduction.errors.rms_deg])
+
+
+def test_errors_of_the_best_channels_are_those_of_the_curve(reduction: Reduction) -> None:
+    assert reduction.evidence is not None
+    curve = error_curve(reduction.evidence)
+    degrees, millimetres = reducing.errors([reduction]).axes
+    for panel, unit in ((degrees, "deg"), (millimetres, "mm")):
+        drawn = lines(panel)
+        best = dict(drawn["best channels"])
+        assert best == {p.channels: p.fitted.by(unit) for p in curve.points}
+        assert "best channels, on takes left out" not in drawn  # one take
+        [preset] = drawn["presets 1 to 4"]
+        assert tuple(preset) == (curve.presets[1][0], curve.presets[1][1].by(unit))
+        assert f"suggested number: {curve.suggested}" in drawn
+
+
+def test_hands_are_drawn_with_every_channel(reduction: Reduction) -> None:
+    figure = rigs.hands(reduction.rig)
+    [panel] = figure.axes
+    marks = [
+        line for line in panel.get_lines() if line.get_marker() in "oD" and len(line.get_xdata())
+    ]
+    assert len(marks) == 50
+    places = {tuple(np.round(line.get_xydata()[0], 3)) for line in marks}
+    assert len(places) == 50
+    free = [m for m in marks if m.get_color() == rigs.COLOURS["free"]]
+    assert len(free) == len(reduction.rig.free)
+    linear = sum(r.kind == "linear" for r in reduction.rig.relations)
+    assert (
+        sum(text.arrow_patch is not None for text in panel.texts if hasattr(text, "arrow_patch"))
+        == linear
+    )
 
 
 def test_counts_that_no_thresholds_leave_have_no_error() -> None:

@@ -14,11 +14,16 @@ from usdhand.motion.rotations import Array
 from usdhand.reduce.evidence import Evidence
 from usdhand.reduce.fit import SMALLEST_RANGE_DEG
 from usdhand.reduce.limits import Limits
+from usdhand.reduce.moments import Moments
 from usdhand.reduce.relate import RIDGES, Shape, best_shape, left_out, residual_moments, told_by
 from usdhand.reduce.rig import Relation
 from usdhand.reduce.settings import Choice, Target
 from usdhand.reduce.subset import Subsets
 
+# Share of its variance that each channel of several takes is held to have of its own, when channels
+# are chosen: other motion follows the relations less, and errors there are smaller where channels
+# that move far are free. Measured by `benchmarks/reduce_takes.py` on motion of other kinds.
+OWN_SHARE = 0.05
 # A twist or spread must lower the squared error so many times more than a flexion.
 PREFERENCE = 1.2
 
@@ -48,15 +53,25 @@ def choose(evidence: Evidence, target: Target, controllers: int | None, choice: 
     return _for_error(evidence, target.max_error, controllers, choice)
 
 
-def subsets(evidence: Evidence, choice: Choice, largest: float | None = None) -> Subsets:
+def subsets(
+    evidence: Evidence,
+    choice: Choice,
+    largest: float | None = None,
+    fitted: Moments | None = None,
+) -> Subsets:
     """The search among the channels that move, or that are kept.
+
+    Parameters
+    ----------
+    largest : error that no channel or fingertip is to exceed, on the motion that is fitted itself
+    fitted : moments of some of the takes instead of all
 
     Raises
     ------
     UsageError
         if a kept channel does not exist, or the same channels are wanted of one hand.
     """
-    names, moments = evidence.names, evidence.moments
+    names, moments = evidence.names, fitted or evidence.moments
     kept = {name for pattern in choice.keep for name in _named(names, pattern)}
     moving = moments.high - moments.low > SMALLEST_RANGE_DEG
     wanted = {name for name, moves in zip(names, moving, strict=True) if moves} | kept
@@ -73,9 +88,10 @@ def subsets(evidence: Evidence, choice: Choice, largest: float | None = None) ->
     keep = frozenset(g for g, own in enumerate(groups) if any(names[i] in kept for i in own))
     dear = [not any(is_flexion(names[i]) for i in own) for own in groups]
     price = np.where(dear, PREFERENCE, 1.0) if choice.prefer == "flexion" else None
-    return Subsets(
-        moments.covariance, evidence.measure(choice.measure), groups, keep, price, largest
-    )
+    covariance = moments.covariance
+    if len(evidence.folds) > 1 and largest is None:
+        covariance = covariance + OWN_SHARE * np.diag(np.diag(covariance))
+    return Subsets(covariance, evidence.measure(choice.measure), groups, keep, price, largest)
 
 
 def model_of(

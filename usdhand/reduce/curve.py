@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from usdhand.reduce.rig import ReducedRig, relation_matrix
 from usdhand.reduce.settings import PRESETS, Choice
 
 # A ridge that serves takes left out about as well as the best one, whatever the count.
-RIDGE = 0.01
+RIDGE = 0.1
 # Counts that the curve is known at; all up to the first step, then wider ones.
 COUNTS = (*range(13), 15, 17, 20, 23, 26, 30, 35, 40, 45)
 
@@ -115,7 +115,7 @@ def _losses(
     evidence: Evidence, fitted: Moments, shown: Sequence[Moments], shape: Shape, choice: Choice
 ) -> dict[int, tuple[Loss, Loss]]:
     """Loss of the best channels, and of PCA, on what is shown, by count."""
-    search = subsets(replace(evidence, folds=(fitted,)), choice)
+    search = subsets(evidence, choice, fitted=fitted)
     axes = np.linalg.eigh(fitted.covariance)[1][:, ::-1]
     target = pooled(shown)
     found = {}

@@ -74,12 +74,11 @@ def gather(takes: Iterable[tuple[Clip, Hands, Channels]]) -> Evidence:
         if a clip has fewer than two frames, or the clips' hands have different joints.
     """
     folds: list[Moments] = []
-    others: Moments | None = None
     names: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
     frames = 0
     sources: list[str] = []
-    tips = bands = np.zeros(())
+    tips = bands = means = np.zeros(())
     for number, (clip, hands, source) in enumerate(takes):
         if len(clip) < 2:
             raise InputError(
@@ -93,23 +92,23 @@ def gather(takes: Iterable[tuple[Clip, Hands, Channels]]) -> Evidence:
             )
         held = held or tuple(n for n in source.names if n not in set(names))
         curves = source.select(names).values
-        own, outside = Moments.of(curves), Moments.of(source.select(held).values)
+        own, outside = Moments.of(curves), source.select(held).values.mean(axis=0)
         if folds:
             own = own.turned(whole_turns(names, own.mean - pooled(folds).mean))
         share = len(clip) / (frames + len(clip))
         tips = (1.0 - share) * tips + share * tip_forms(clip, hands, source)
         bands = (1.0 - share) * bands + share * band_covariances(curves, clip.fps)
         frames += len(clip)
-        others = outside if others is None else others.plus(outside)
+        means = (1.0 - share) * means + share * outside
         if number < MOST_FOLDS:
             folds.append(own)
         else:
             folds[number % MOST_FOLDS] = folds[number % MOST_FOLDS].plus(own)
         sources.append(clip.name)
-    if others is None:
+    if not folds:
         raise InputError("There is no clip to fit a rig to.")
-    means = dict(zip(held, (float(v) for v in others.mean), strict=True))
-    return Evidence(names, tuple(folds), means, tips, bands, tuple(sources))
+    angles = {name: float(mean) for name, mean in zip(held, means, strict=True)}
+    return Evidence(names, tuple(folds), angles, tips, bands, tuple(sources))
 
 
 def tip_forms(clip: Clip, hands: Hands, source: Channels) -> Array:

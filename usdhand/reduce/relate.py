@@ -21,6 +21,8 @@ RIDGES = (1e-9, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 NUMBERS = (1, 2, 3, 4, 6, 9, 14)
 # Fewer controllers are taken where they raise the error by no more than this share.
 WORTHWHILE = 0.01
+# Squared errors on takes left out that differ by less are alike.
+ALIKE = 1.02**2
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,8 @@ def best_shape(
 ) -> Shape:
     """Ridge, and number of controllers up to ``most``, with the least error on folds left out.
 
-    Of what is about as good, the fewest controllers. One fold alone shows nothing about others:
+    Of what is about as good, the largest ridge, since takes of one session are more alike than what
+    a rig meets later, and the fewest controllers. One fold alone shows nothing about others:
     all controllers then, and no ridge.
     """
     if len(folds) < 2 or not len(free):
@@ -86,7 +89,8 @@ def best_shape(
     def error(shape: Shape) -> float:
         return float(measure.parts(left_out(folds, free, shape)).mean())
 
-    ridge = min(RIDGES, key=lambda r: (error(Shape(most, r)), r))
+    by_ridge = [error(Shape(most, r)) for r in RIDGES]
+    ridge = max(r for r, e in zip(RIDGES, by_ridge, strict=True) if e <= min(by_ridge) * ALIKE)
     limit = len(free) if most is None else min(most, len(free))
     tried = [Shape(n, ridge) for n in NUMBERS if n < limit] + [Shape(most, ridge)]
     errors = [error(shape) for shape in tried]

@@ -12,20 +12,20 @@ from usdhand.reduce.evidence import Evidence
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.settings import ReduceSettings
 from usdhand.report.plots import style
-from usdhand.report.plots.style import BLACK, BLUE, GREY, ORANGE, SKY, YELLOW, styled
+from usdhand.report.plots.style import BLACK, GREY, LIGHT, ORANGE, YELLOW, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-NAMES = ("reduce_curve",)
+NAMES = ("reduce_errors",)
 UNITS = {"deg": "RMS error over all channels, deg", "mm": "RMS error of the fingertips, mm"}
 
 
 def figures(rig: ReducedRig, evidence: Evidence, settings: ReduceSettings) -> dict[str, Figure]:
     """The plot of a fit by name."""
     curve = error_curve(evidence, settings.choice, settings.controllers)
-    return {"reduce_curve": draw(rig, evidence, curve)}
+    return {"reduce_errors": draw(rig, evidence, curve)}
 
 
 @styled
@@ -35,39 +35,51 @@ def draw(rig: ReducedRig, evidence: Evidence, curve: ErrorCurve) -> Figure:
         "What the best channels lose, by how many stay free", (9.5, 4.0), 1, 2
     )
     for panel, unit in zip(panels, UNITS, strict=True):
-        _panel(panel, curve, unit)
-        own = rig_loss(rig, evidence).by(unit)
-        label = f"this rig: {len(rig.free)} free, {own:.2f} {unit}"
-        panel.plot([len(rig.free)], [own], "o", color=ORANGE, label=label)
-        panel.axvline(
-            curve.suggested, color=YELLOW, linewidth=0.9, label=f"suggested: {curve.suggested}"
-        )
-        panel.set_xlim(0, len(rig.names))
-        panel.set_ylim(bottom=0)
-        panel.set_xlabel("free channels")
-        panel.set_ylabel(UNITS[unit])
-        panel.legend(loc="upper right")
+        add_pca(panel, curve, unit)
+        add_best(panel, curve, unit)
+        finish(panel, rig, unit, rig_loss(rig, evidence).by(unit))
     return figure
 
 
-def _panel(panel: Axes, curve: ErrorCurve, unit: str) -> None:
-    points = curve.points
+def add_pca(panel: Axes, curve: ErrorCurve, unit: str) -> None:
+    """PCA of the same size, on what was fitted."""
+    counts, errors = _known(curve.points, "pca", unit)
+    panel.plot(
+        counts, errors, "--", color=GREY, label="PCA: the smallest error of any linear model"
+    )
+
+
+def add_best(panel: Axes, curve: ErrorCurve, unit: str) -> None:
+    """The best channels by their number, the presets, and the suggested number."""
     parts: tuple[tuple[str, str, str, str], ...] = (
-        ("fitted", "-", BLUE, "best channels, fitted"),
-        ("left_out", "-", SKY, "best channels, takes left out"),
-        ("pca", "--", BLACK, "PCA, fitted"),
-        ("pca_left_out", "--", GREY, "PCA, takes left out"),
+        ("fitted", "-", BLACK, "best channels"),
+        ("left_out", "-", YELLOW, "best channels, on takes left out"),
+        ("pca_left_out", ":", GREY, "PCA, on takes left out"),
     )
     for name, line, colour, label in parts:
-        counts, errors = _known(points, name, unit)
-        if len(counts):
+        counts, errors = _known(curve.points, name, unit)
+        if counts:
             panel.plot(counts, errors, line, color=colour, label=label)
     for number, (preset, (count, loss)) in enumerate(curve.presets.items()):
-        label = "presets 1 to 4, fitted" if number == 0 else "_"
+        label = "presets 1 to 4" if number == 0 else "_"
         panel.plot([count], [loss.by(unit)], "s", color=BLACK, markersize=4, label=label)
         panel.annotate(
             str(preset), (count, loss.by(unit)), (3, 3), textcoords="offset points", fontsize=7
         )
+    panel.axvline(
+        curve.suggested, color=LIGHT, label=f"suggested number: {curve.suggested}", zorder=0
+    )
+
+
+def finish(panel: Axes, rig: ReducedRig, unit: str, own: float) -> None:
+    """The rig itself, and what the axes mean."""
+    label = f"this rig: {len(rig.free)} free, {own:.2f} {unit}"
+    panel.plot([len(rig.free)], [own], "o", color=ORANGE, label=label)
+    panel.set_xlim(0, len(rig.names))
+    panel.set_ylim(bottom=0)
+    panel.set_xlabel("free channels")
+    panel.set_ylabel(UNITS[unit])
+    panel.legend(loc="upper right")
 
 
 def _known(points: Sequence[CurvePoint], name: str, unit: str) -> tuple[list[int], list[float]]:

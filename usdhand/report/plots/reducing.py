@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from usdhand.motion.rotations import Array
+from usdhand.reduce.curve import error_curve, rig_loss
 from usdhand.reduce.errors import pca_rms
 from usdhand.reduce.fit import Statistics
 from usdhand.reduce.method import Reduction
@@ -29,7 +30,6 @@ NAMES = (
     "reduce_histograms",
     "reduce_curves",
     "reduce_errors",
-    *curve.NAMES,
 )
 MOST_FOLLOWERS, MOST_CURVES = 12, 6
 SCATTER_POINTS = 600
@@ -52,11 +52,9 @@ def figures(
         "reduce_followers": followers(reductions),
         "reduce_histograms": histograms(reductions),
         "reduce_curves": curves(reductions),
-        "reduce_errors": errors(reductions),
+        "reduce_errors": errors(reductions, settings),
     }
-    rig, evidence = reductions[0].rig, reductions[0].evidence
-    more = {} if evidence is None else curve.figures(rig, evidence, settings or ReduceSettings())
-    return {name: figure for name, figure in found.items() if figure is not None} | more
+    return {name: figure for name, figure in found.items() if figure is not None}
 
 
 @styled
@@ -192,14 +190,17 @@ def _how(relation: Relation) -> str:
 
 
 @styled
-def errors(reductions: Sequence[Reduction]) -> Figure:
-    """RMS error against the number of free channels, by both fits, beside the bound of PCA."""
+def errors(reductions: Sequence[Reduction], settings: ReduceSettings | None = None) -> Figure:
+    """Errors against the number of free channels: the paper's rules, the best channels, PCA.
+
+    In degrees; of a rig that was fitted to these clips also in millimetres at the fingertips.
+    """
     rig, statistics = reductions[0].rig, _statistics(reductions)
-    stacked = _stacked(reductions)
+    evidence, stacked = reductions[0].evidence, _stacked(reductions)
     counts = np.arange(len(rig.names) + 1)
-    figure, [panel] = style.new_figure(
-        "What reduction loses, by how many channels stay free", (6.5, 4.0)
-    )
+    title = "What reduction loses, by how many channels stay free"
+    size = (6.5, 4.0) if evidence is None else (11.0, 4.2)
+    figure, [panel, *others] = style.new_figure(title, size, 1, 1 if evidence is None else 2)
     fits: tuple[tuple[Fit, str, str, float], ...] = (
         ("paper", SKY, "one controller, the paper's fit", 3.5),
         ("least-squares", BLUE, "one controller, least squares", 1.3),
@@ -210,14 +211,14 @@ def errors(reductions: Sequence[Reduction]) -> Figure:
         panel.plot(counts[there], by_count[there], color=colour, label=label, linewidth=width)
     bound = [pca_rms(stacked, int(n)) for n in counts]
     panel.plot(counts, bound, "--", color=GREY, label="PCA: the smallest error of any linear model")
-    own = float(np.sqrt(np.mean(_rms(reductions) ** 2)))
-    label = f"this rig: {len(rig.free)} free, {own:.2f} deg"
-    panel.plot([len(rig.free)], [own], "o", color=ORANGE, label=label)
-    panel.set_xlim(0, len(rig.names))
-    panel.set_ylim(bottom=0)
-    panel.set_xlabel("free channels")
-    panel.set_ylabel("RMS error over all channels, deg")
-    panel.legend(loc="upper right")
+    if evidence is not None:
+        settings = settings or ReduceSettings()
+        by_number = error_curve(evidence, settings.choice, settings.controllers)
+        curve.add_best(panel, by_number, "deg")
+        curve.add_pca(others[0], by_number, "mm")
+        curve.add_best(others[0], by_number, "mm")
+        curve.finish(others[0], rig, "mm", rig_loss(rig, evidence).mm)
+    curve.finish(panel, rig, "deg", float(np.sqrt(np.mean(_rms(reductions) ** 2))))
     return figure
 
 
