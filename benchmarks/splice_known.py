@@ -28,9 +28,10 @@ from usdhand.anatomy import Side  # noqa: E402
 from usdhand.motion.rotations import Array  # noqa: E402
 from usdhand.splice.band import Band, pinned_band  # noqa: E402
 from usdhand.splice.markers import Markers, hand_markers  # noqa: E402
-from usdhand.splice.method import Alignment, Spliced, align, splice  # noqa: E402
+from usdhand.splice.method import Alignment, Spliced, splice  # noqa: E402
 from usdhand.splice.phases import facing, smoothed, steady_turns  # noqa: E402
 from usdhand.splice.settings import PAPER, SpliceSettings  # noqa: E402
+from usdhand.splice.timing import align  # noqa: E402
 
 SETTINGS = SpliceSettings()
 REAL = HERE.parent / "shared" / "data" / "studiogalt" / "full"
@@ -76,27 +77,34 @@ def pair_errors(pair: Pair, side: Side, alignment: Alignment) -> dict[str, Array
     body = hand_markers(pair.body, pair.body_hands, side, SETTINGS.fps)
     hand = hand_markers(pair.hands, pair.hand_hands, side, SETTINGS.fps)
     times = np.arange(len(pair.body)) / pair.body.fps
-    _, axes, _ = align(body, hand, PAPER, (), times)
+    [axes] = align([(body, hand)], PAPER, (), times)
     turned = facing(hand, steady_turns(body, hand, np.linspace(0, len(hand) - 1, len(body)))[:1])
-
-    def values(order: int) -> Callable[[Markers], Array]:
-        deviation = SETTINGS.smoothing * SETTINGS.fps
-        return lambda m: smoothed(m.positions, deviation, order).reshape(len(m), -1)
-
-    def derivatives(m: Markers) -> Array:
-        both = [values(1)(m), values(2)(m)]
-        return np.concatenate([d / np.sqrt(np.mean(d**2)) for d in both], axis=1)
 
     warps = {
         "linear stretch": times * (pair.hands.duration / times[-1]),
-        "DTW on positions": plain_warp(values(0), body, turned, times),
+        "DTW on positions": plain_warp(positions, body, turned, times),
         "DTW on derivative values": plain_warp(derivatives, body, turned, times),
-        "pass 1, signs along the 3 axes": axes,
+        "pass 1, signs along the 3 axes": axes.phase_warp,
         "pass 1": alignment.phase_warp,
         "full method": alignment.warp[:, 1],
     }
     moving = pair.moving(side)
     return {name: pair.error(warp)[moving] for name, warp in warps.items()}
+
+
+def positions(markers: Markers) -> Array:
+    return _smooth(markers, 0)
+
+
+def derivatives(markers: Markers) -> Array:
+    """Velocities and accelerations, each of unit RMS."""
+    both = [_smooth(markers, 1), _smooth(markers, 2)]
+    return np.concatenate([d / np.sqrt(np.mean(d**2)) for d in both], axis=1)
+
+
+def _smooth(markers: Markers, order: int) -> Array:
+    curves = smoothed(markers.positions, SETTINGS.smoothing * SETTINGS.fps, order)
+    return curves.reshape(len(markers), -1)
 
 
 def plain_warp(

@@ -229,7 +229,7 @@ def test_cost_grid_is_the_mean_of_the_methods_own_costs(
     warp = np.interp(np.arange(len(ours)) / ours.fps, *alignment.warp.T) * theirs.fps
     turned = facing(ours, -steady_turns(ours, theirs, warp))
     signs = [
-        derivative_signs(m, settings.smoothing, settings.dead_zone, np.zeros(1))
+        derivative_signs(m, settings.rule(settings.smoothing), np.zeros(1))
         for m in (turned, theirs)
     ]
     for i, j in ((3, 4), (100, 120), (240, 200)):

@@ -9,14 +9,21 @@ from hypothesis import strategies as st
 from oracles.splice_2006 import algorithm_1, best_turn, distance_of_signs
 from scipy.spatial.transform import Rotation
 
-from usdhand.dtw.phases import UNREACHED, phase_path, sign_costs, signs_along, turn_angles
+from usdhand.dtw.phases import (
+    REST_COST,
+    UNREACHED,
+    phase_path,
+    sign_costs,
+    signs_along,
+    turn_angles,
+)
 from usdhand.errors import UsageError
 from usdhand.splice.band import anchors_of, band_along, checked_pins, pinned_band
 from usdhand.splice.markers import Markers
-from usdhand.splice.method import align
 from usdhand.splice.phases import smoothed
 from usdhand.splice.refine import refined
 from usdhand.splice.settings import Pin, SpliceSettings
+from usdhand.splice.timing import align
 from usdhand.splice.warps import EXACT, through_pins, whittaker_smoothed
 
 NO_TURN = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
@@ -65,6 +72,42 @@ def test_agrees_with_algorithm_1(problem) -> None:
     for x, y, tolerance in pins:  # the path passes, at most one diagonal step beside
         assert last[x] <= y + tolerance
         assert first[x + 1] >= y - tolerance
+
+
+@given(problems(), st.integers(-1, 40))
+def test_a_rest_uses_up_frames_of_its_own_clip(problem, rest_signs: int) -> None:
+    n, m, count, seed, width, pins = problem
+    random = np.random.default_rng(seed)
+    p, q = (random.integers(-1, 2, (k, count)) * (random.random((k, 1)) < 0.6) for k in (n, m))
+    band = pinned_band(((0, 0, 0), *pins, (n - 1, m - 1, 0)), width)
+    first, last, cost = phase_path(
+        words(p), words(q)[None], *NO_TURN, band.low, band.high, rest_signs
+    )
+
+    def alone(signs: np.ndarray, match: int) -> int:
+        active = int(np.abs(signs).sum())
+        return min(match, active + REST_COST) if active <= rest_signs else match
+
+    total = np.full((n + 1, m + 1), 10**9)
+    total[0, 0] = 0
+    for i in range(n):
+        for j in range(band.low[i], band.high[i] + 1):
+            match = distance_of_signs(p[i], q[j])
+            total[i + 1, j + 1] = min(
+                total[i, j] + match,
+                total[i, j + 1] + alone(p[i], match),
+                total[i + 1, j] + alone(q[j], match),
+            )
+    assert cost == total[n, m]
+    found = 0
+    for before, (i, j) in zip([None, *cells(first, last)], cells(first, last), strict=False):
+        match = distance_of_signs(p[i], q[j])
+        if before and i == before[0]:
+            match = alone(q[j], match)
+        elif before and j == before[1]:
+            match = alone(p[i], match)
+        found += match
+    assert found == cost
 
 
 def test_turns_are_the_papers() -> None:
@@ -181,13 +224,13 @@ def test_pass_2_finds_parts_of_a_frame_and_stays_where_it_may_not_move() -> None
     shift = 3.3 * np.sin(np.pi * rows / 299) ** 2
     body, hand = moving_hand((rows + shift) / 60.0), moving_hand(rows / 60.0)
     room = np.full(300, 12.0)
-    found = refined(body, hand, rows, room, "local", 7.0) - rows
+    found = refined([(body, hand)], rows, room, "local", 7.0) - rows
     assert np.abs(found - shift)[10:-10].max() < 0.5
     assert np.abs(found - shift).mean() < 0.1
     room[150] = 0.0
-    assert abs(refined(body, hand, rows, room, "local", 7.0)[150] - 150.0) < 1e-6
+    assert abs(refined([(body, hand)], rows, room, "local", 7.0)[150] - 150.0) < 1e-6
     still = moving_hand(np.zeros(300))
-    assert np.abs(refined(still, still, rows, room, "local", 7.0) - rows).max() < 1e-6
+    assert np.abs(refined([(still, still)], rows, room, "local", 7.0) - rows).max() < 1e-6
 
 
 def test_pins_that_cannot_hold_are_named() -> None:
@@ -271,9 +314,9 @@ def test_all_passes_get_through_whatever_the_pins(
     body = moving_hand(np.arange(rows) / 60.0)
     pins = checked_pins(one_a_frame(pins), "left", (rows - 1) / 60.0, (columns - 1) / 60.0)
     times = np.arange(rows) / 60.0
-    second, first, cost = align(body, hand, SpliceSettings(band=(width, 0.01)), pins, times)
-    assert cost < UNREACHED
-    for warp in (first, second):
+    [found] = align([(body, hand)], SpliceSettings(band=(width, 0.01)), pins, times)
+    assert found.cost < UNREACHED
+    for warp in (found.phase_warp, found.warp):
         assert (np.diff(warp) >= 0).all()
         assert all(abs(np.interp(p.body, times, warp) - p.hand) < p.tolerance + 1e-6 for p in pins)
 
@@ -284,7 +327,8 @@ def test_pins_may_cross_within_their_tolerances() -> None:
     rows, times = 481, np.arange(481) / 60.0
     assert anchors_of(pins, rows, rows, 60.0)[1:3] == ((60, 297, 3), (390, 297, 3))
     hand = moving_hand(times)
-    for warp in align(hand, hand, SpliceSettings(band=(0.01, 0.01)), pins, times)[:2]:
+    [found] = align([(hand, hand)], SpliceSettings(band=(0.01, 0.01)), pins, times)
+    for warp in (found.phase_warp, found.warp):
         for pin in pins:
             assert abs(np.interp(pin.body, times, warp) - pin.hand) < pin.tolerance + 1e-6
     with pytest.raises(UsageError, match="cross"):

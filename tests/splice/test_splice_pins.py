@@ -14,8 +14,9 @@ from conftest import REPOSITORY, shared_data
 from usdhand import find_hands, read_clip
 from usdhand.anatomy import SIDES, Side
 from usdhand.splice.markers import Markers
-from usdhand.splice.method import align, splice
+from usdhand.splice.method import splice
 from usdhand.splice.settings import Pin, SpliceSettings
+from usdhand.splice.timing import align
 from usdhand.verbs.splice import splice_hands
 
 SAMPLES = REPOSITORY / "samples"
@@ -137,8 +138,7 @@ def test_counting_every_left_step() -> None:
     body, hands = waves(6), waves(3)
     times = np.arange(len(body)) / 60.0
     pins = [Pin(t, s) for k in range(3) for t, s in ((2.0 * k, k), (2.0 * k + 1.0, k + 1.0))][1:]
-    free, _, _ = align(body, hands, SpliceSettings(), (), times)
-    pinned, _, _ = align(body, hands, SpliceSettings(), pins, times)
+    free, pinned = (align([(body, hands)], SpliceSettings(), p, times)[0].warp for p in ((), pins))
     for wave in range(6):
         inside = (times > wave + 0.2) & (times < wave + 0.8)
         wanted = times[inside] - (wave + 1) // 2 if wave % 2 == 0 else np.full(36, wave // 2 + 1.0)
@@ -158,3 +158,26 @@ def waves(count: int) -> Markers:
     around = np.array([[3.0, 0.0, 0.0], [-3.0, 0.0, 0.0], [0.0, 0.0, -8.0], [0.0, 0.0, 8.0]])
     forearm = np.tile([0.0, 0.0, 1.0], (len(t), 1))
     return Markers(wrist[:, None] + around, wrist, forearm, None, 60.0, "shoulder")
+
+
+@pytest.mark.parametrize("off", [0.4, -0.3])
+def test_a_pin_that_contradicts_the_motion_is_said_and_does_not_reach_far(off: float) -> None:
+    pair = sample()
+    free = spliced(pair).hands["right"].warp
+    moving = pair.moving("right")
+    at = int(np.flatnonzero(moving)[moving.sum() // 2])
+    pins = (Pin(free[at, 0], free[at, 1] + off, side="right", name="odd"),)
+    found = spliced(pair, SpliceSettings(pins=pins))
+    [note] = [p for p in found.problems if p.code == "pin-contradicts"]
+    assert "odd" in note.message
+    assert f"{abs(off):.2f} s" in note.message
+    apart = np.abs(found.hands["right"].warp[:, 1] - free[:, 1])
+    assert abs(apart[at] - abs(off)) < 1e-6
+    assert apart[np.abs(free[:, 0] - free[at, 0]) >= 1.0].max() < 2.0 / pair.body.fps
+
+
+def test_a_true_pin_is_no_contradiction() -> None:
+    pair = sample()
+    pin = Pin(340 / pair.body.fps, float(pair.truth[340]))
+    found = spliced(pair, SpliceSettings(pins=(pin,)))
+    assert not [p for p in found.problems if p.code == "pin-contradicts"]

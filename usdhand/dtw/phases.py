@@ -5,6 +5,9 @@
 for two rows only; of every cell two bits remember where its path comes from, so that memory is
 the band's area / 4 bytes.
 
+A step to the next row or column alone costs what the cell does, or less where the clip that moves
+on rests: then only what of its signs is not zero, see `REST_COST`.
+
 Of predecessors with equal cost the diagonal one is taken, then the one in the row before (the hand
 clip waits), then the one in the column before (the body waits).
 """
@@ -21,6 +24,10 @@ Costs = NDArray[np.int32]
 
 UNREACHED = np.int32(2**30)  # the cost of a cell that no path reaches
 BLOCK = 4  # rows and columns of cells that share one turn about the vertical
+# What a step in one clip alone costs beside the signs of a frame that rests. It is not free, so
+# that clips that rest together go on together.
+REST_COST = 2
+NEVER_RESTS = -1
 _DIAGONAL, _ROW_BEFORE, _COLUMN_BEFORE = 0, 1, 2
 _U = np.uint64
 
@@ -33,6 +40,7 @@ def phase_path(
     hand_windows: Floats,
     low: Ints,
     high: Ints,
+    rest_signs: int = NEVER_RESTS,
 ) -> tuple[Ints, Ints, int]:
     """Least-cost path under the sign cost of Majkowska et al. 2006, equations (1) to (7).
 
@@ -47,6 +55,8 @@ def phase_path(
         every `BLOCK` rows, less their mean
     hand_windows : (2, n, column blocks) likewise
     low, high : (rows,) bounds of the band
+    rest_signs : a frame with at most as many signs that are not zero rests, and uses up
+        frames of its own clip only
 
     Returns
     -------
@@ -69,6 +79,9 @@ def phase_path(
     here = np.full(columns + 1, UNREACHED, np.int32)
     local = np.zeros(columns, np.int32)
     positive, negative = hand[0, 0].copy(), hand[0, 1].copy()
+    waits = np.full(columns, UNREACHED, np.int32)  # cost of passing a column within a row
+    for j in range(columns):
+        waits[j] = _rest_cost(hand[0, 0, j], hand[0, 1, j], rest_signs)
     above[low[0]] = 0  # every path starts in the first cell
     for i in range(rows):
         first, last = low[i], high[i]
@@ -78,8 +91,9 @@ def phase_path(
                 body_windows[i // BLOCK], hand_windows, hand, first, end, positive, negative
             )
         _compare(body[0, i], body[1, i], positive, negative, first, last, local)
-        _accumulate(local, above, here, first, last)
-        _store_moves(local, above, here, first, last, moves, starts[i])
+        down = _rest_cost(body[0, i], body[1, i], rest_signs)
+        _accumulate(local, waits, down, above, here, first, last)
+        _store_moves(local, down, above, here, first, last, moves, starts[i])
         for j in range(low[max(i - 1, 0)], first + 1):  # columns that the band has left behind
             here[j] = UNREACHED
         above[low[0]] = UNREACHED
@@ -217,38 +231,57 @@ def sign_costs(body: Words, hand: Words, columns: Ints) -> Costs:
 
 
 @kernel
-def _accumulate(local: Costs, above: Costs, here: Costs, first: int, last: int) -> None:
+def _rest_cost(up: np.uint64, down: np.uint64, rest_signs: int) -> np.int32:
+    """Most that a step in one clip alone costs for a frame of these signs."""
+    signs = np.int32(_bits(up | down))
+    return signs + np.int32(REST_COST) if signs <= rest_signs else UNREACHED
+
+
+@kernel
+def _accumulate(
+    local: Costs, waits: Costs, down: np.int32, above: Costs, here: Costs, first: int, last: int
+) -> None:
     for j in range(_U(first), _U(last + 1)):
-        here[j + _U(1)] = min(above[j], above[j + _U(1)]) + local[j]
+        cost = local[j]
+        here[j + _U(1)] = min(above[j] + cost, above[j + _U(1)] + min(cost, down))
     left = UNREACHED
     for j in range(_U(first), _U(last + 1)):
-        left = min(here[j + _U(1)], left + local[j])
+        left = min(here[j + _U(1)], left + min(local[j], waits[j]))
         here[j + _U(1)] = left
 
 
 @kernel
 def _store_moves(
-    local: Costs, above: Costs, here: Costs, first: int, last: int, moves: Bytes, offset: int
+    local: Costs,
+    down: np.int32,
+    above: Costs,
+    here: Costs,
+    first: int,
+    last: int,
+    moves: Bytes,
+    offset: int,
 ) -> None:
     cells = last + 1 - first
     for k in range(_U(cells >> 2)):
         j = _U(first) + (k << _U(2))
-        move = _move(local, above, here, j) | (_move(local, above, here, j + _U(1)) << 2)
-        move |= _move(local, above, here, j + _U(2)) << 4
-        moves[_U(offset) + k] = np.uint8(move | (_move(local, above, here, j + _U(3)) << 6))
+        move = _move(local, down, above, here, j) | (
+            _move(local, down, above, here, j + _U(1)) << 2
+        )
+        move |= _move(local, down, above, here, j + _U(2)) << 4
+        moves[_U(offset) + k] = np.uint8(move | (_move(local, down, above, here, j + _U(3)) << 6))
     for at in range(cells & ~3, cells):
-        move = _move(local, above, here, _U(first + at))
+        move = _move(local, down, above, here, _U(first + at))
         moves[offset + (at >> 2)] |= np.uint8(move << (2 * (at & 3)))
 
 
 @kernel
-def _move(local: Costs, above: Costs, here: Costs, j: np.uint64) -> int:
+def _move(local: Costs, down: np.int32, above: Costs, here: Costs, j: np.uint64) -> int:
     """Where the path to a cell comes from."""
-    before = here[j + _U(1)] - local[j]
+    cost, total = local[j], here[j + _U(1)]
     move = _COLUMN_BEFORE
-    if above[j + _U(1)] == before:
+    if above[j + _U(1)] + min(cost, down) == total:
         move = _ROW_BEFORE
-    if above[j] == before:
+    if above[j] + cost == total:
         move = _DIAGONAL
     return move
 

@@ -51,6 +51,11 @@ def _hand_data(alignment: Alignment, body: Clip) -> dict[str, Any]:
         "pass_lag": rounded(alignment.pass_lag),
         "taken_from": alignment.taken_from,
         "measured_from": {"body": alignment.origins[0], "hands": alignment.origins[1]},
+        "one_timing": alignment.shared,
+        "frozen": {
+            clip: [[rounded(a), rounded(b)] for a, b in ranges]
+            for clip, ranges in zip(("body", "hands"), alignment.frozen, strict=True)
+        },
         "phases": [
             {
                 "start": rounded(p.start),

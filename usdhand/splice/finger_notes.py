@@ -11,7 +11,7 @@ from usdhand.anatomy.channels import encode, fingers_move
 from usdhand.errors import InputError
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
-from usdhand.problems import Problem
+from usdhand.problems import Problem, listed
 
 # The last pose of a hand clip that stays for as many seconds is worth a note.
 HELD_S = 0.5
@@ -39,6 +39,34 @@ def still_finger_notes(
         note = f"the fingers of the {side} hand do not move in the hand clip {hand_clip.name}"
         note += ", and replace moving ones of the body" if side in lost else ""
         notes.append(Problem("still-fingers", note))
+    return notes
+
+
+def frozen_notes(
+    body: Clip,
+    hand_clip: Clip,
+    frozen: Mapping[Side, tuple[Sequence[tuple[float, float]], Sequence[tuple[float, float]]]],
+) -> list[Problem]:
+    """Notes on what recordings lack: frames that repeat the one before, then a jump.
+
+    Parameters
+    ----------
+    frozen : first and last seconds of every range, of the body and of the hand clip
+    """
+    notes = []
+    for side, both in frozen.items():
+        for clip, ranges, kind in zip((body, hand_clip), both, ("body", "hand clip"), strict=True):
+            if not ranges:
+                continue
+            where = listed([f"{a:.2f} to {b:.2f} s" for a, b in ranges])
+            what = " and fingers bridged" if clip is hand_clip else ""
+            notes.append(
+                Problem(
+                    "frozen-frames",
+                    f"the {side} arm of the {kind} {clip.name} freezes at {where}, as when "
+                    f"markers are hidden: its motion is bridged there{what}",
+                )
+            )
     return notes
 
 

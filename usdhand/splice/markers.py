@@ -13,6 +13,7 @@ from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import unit
+from usdhand.splice.frozen import bridged, bridged_rotations, frozen_ranges
 
 # How far from the wrist the markers are, as shares of the distance to the middle knuckle and to the
 # elbow. They can stand off further than glued ones, and then tell more about rotation.
@@ -35,6 +36,7 @@ class Markers:
     facing : (frames, 2) level direction x, z to the trunk's left, None without a trunk
     fps : frames a second
     origin : name of the joint that the positions are measured from, or `WORLD_ORIGIN`
+    frozen : first and last seconds of what the recording lacks; there the markers are bridged
     """
 
     positions: Array
@@ -43,6 +45,7 @@ class Markers:
     facing: Array | None
     fps: float
     origin: str
+    frozen: tuple[tuple[float, float], ...] = ()
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -52,6 +55,15 @@ class Markers:
         """From the wrist to the middle knuckle: what is far and near for this character."""
         return float(np.linalg.norm(self.positions[0, 3] - self.wrist[0])) / ALONG_HAND
 
+    @property
+    def seen(self) -> Array:
+        """(frames,) 1, or 0 where the recording lacks something."""
+        seconds = np.arange(len(self)) / self.fps
+        seen = np.ones(len(self))
+        for first, last in self.frozen:
+            seen[(seconds >= first - 1e-6) & (seconds <= last + 1e-6)] = 0.0
+        return seen
+
 
 def hand_markers(clip: Clip, hands: Hands, side: Side, fps: float) -> Markers:
     """Markers of one hand at an analysis rate, over the clip's time from its first frame."""
@@ -60,12 +72,13 @@ def hand_markers(clip: Clip, hands: Hands, side: Side, fps: float) -> Markers:
     pose = forward_kinematics(clip, {j for j in (hand.wrist, elbow, origin) if j is not None})
     count = int(np.floor(clip.duration * fps + 1e-6)) + 1
     at = np.asarray(np.arange(count) * (clip.fps / fps), float)
-    start = np.zeros((1, 3)) if origin is None else interpolate(pose.position(origin), at)
-    wrist = interpolate(pose.position(hand.wrist), at) - start
-    to_elbow = interpolate(pose.position(elbow), at) - start - wrist
-    palm = rot.multiply(
-        interpolate_rotations(rot.make_continuous(pose.rotation(hand.wrist)), at), frames.palm
-    )
+    shoulder = np.zeros((1, 3)) if origin is None else pose.position(origin)
+    places = pose.position(hand.wrist) - shoulder
+    arms = pose.position(elbow) - pose.position(hand.wrist)
+    palms = rot.multiply(rot.make_continuous(pose.rotation(hand.wrist)), frames.palm)
+    frozen = frozen_ranges(_bend(palms, arms), places)
+    wrist, to_elbow = (interpolate(bridged(v, frozen), at) for v in (places, arms))
+    palm = interpolate_rotations(bridged_rotations(palms, frozen), at)
     scale = _scale(clip, hand.wrist)
     length = scale * _palm_length(clip.skeleton, hand)
     axes = rot.to_matrix(palm)
@@ -79,16 +92,22 @@ def hand_markers(clip: Clip, hands: Hands, side: Side, fps: float) -> Markers:
         ],
         axis=1,
     )
-    distance = np.linalg.norm(to_elbow, axis=-1, keepdims=True)
-    direction = -to_elbow / np.where(distance > 1e-9, distance, 1.0)
     return Markers(
         positions,
         wrist,
-        np.einsum("tij,ti->tj", axes, direction),
+        _bend(palm, to_elbow),
         _facing(clip, hands, at),
         fps,
         WORLD_ORIGIN if origin is None else clip.skeleton.names[origin],
+        tuple((first / clip.fps, last / clip.fps) for first, last in frozen),
     )
+
+
+def _bend(palm: Array, to_elbow: Array) -> Array:
+    """Unit direction (frames, 3) of the forearm in the axes of the palm."""
+    distance = np.linalg.norm(to_elbow, axis=-1, keepdims=True)
+    direction = -to_elbow / np.where(distance > 1e-9, distance, 1.0)
+    return np.asarray(np.einsum("tij,ti->tj", rot.to_matrix(palm), direction))
 
 
 def resample_markers(markers: Markers, frames: Array, fps: float) -> Markers:
@@ -100,6 +119,7 @@ def resample_markers(markers: Markers, frames: Array, fps: float) -> Markers:
         forearm=interpolate(markers.forearm, frames),
         facing=None if markers.facing is None else interpolate(markers.facing, frames),
         fps=fps,
+        frozen=(),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from usdhand.anatomy import Channels, HandFrames, Hands, Side
@@ -11,6 +13,7 @@ from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.resample import interpolate, interpolate_rotations
 from usdhand.motion.rotations import Array
+from usdhand.splice.frozen import bridged_smoothly
 from usdhand.splice.markers import arm_origin
 from usdhand.splice.phases import smoothed
 
@@ -28,6 +31,7 @@ def with_fingers(
     hand_frames: HandFrames,
     warp: Array,
     exact: Array | None = None,
+    frozen: Sequence[tuple[float, float]] = (),
 ) -> tuple[Clip, tuple[str, ...]]:
     """The body with the fingers that the hand clip has at the warp's times.
 
@@ -35,6 +39,7 @@ def with_fingers(
     ----------
     warp : (body frames,) seconds of the hand clip from its first frame
     exact : (body frames,) whether a frame shows this very moment, and nothing of those around it
+    frozen : first and last seconds of the hand clip between which fingers that rest are bridged
 
     Returns
     -------
@@ -45,7 +50,8 @@ def with_fingers(
     theirs = frozenset(other.names)
     names = tuple(name for name in own.names if name in theirs)
     times = _times_within(warp, exact) * hand_clip.fps
-    curves = other.select(names).values
+    ranges = [(round(a * hand_clip.fps), round(b * hand_clip.fps)) for a, b in frozen]
+    curves = bridged_smoothly(other.select(names).values, ranges)
     taken = np.mean([interpolate(curves, t) for t in times], axis=0)
     taken = _smooth_at_speed_jumps(taken, warp, exact)
     return decode(own.replaced(Channels(names, taken)), body, frames), names

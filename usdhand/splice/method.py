@@ -14,34 +14,25 @@ from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.problems import Problem
 from usdhand.progress import Progress, Steps
-from usdhand.splice.band import (
-    Band,
-    anchors_of,
-    band_along,
-    checked_pins,
-    pinned_band,
-)
-from usdhand.splice.finger_notes import held_pose_notes, still_finger_notes
+from usdhand.splice.band import checked_pins
+from usdhand.splice.finger_notes import frozen_notes, held_pose_notes, still_finger_notes
 from usdhand.splice.lengths import length_notes, pin_advice
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.merge import with_fingers, with_wrist
-from usdhand.splice.phases import path_with_steady_turns, phase_path, rematched, smoothed
+from usdhand.splice.phases import smoothed
+from usdhand.splice.pin_notes import contradiction_notes
 from usdhand.splice.quality import Phase, phase_qualities
-from usdhand.splice.refine import refined
+from usdhand.splice.reach import Contradiction
+from usdhand.splice.refine import MarkerPair
 from usdhand.splice.settings import Pin, SpliceSettings
+from usdhand.splice.timing import Timing, align_hands, check_trunks, hands_steps
 from usdhand.splice.warps import through_pins
 
 # A hand whose wrist stays within this of its mean, in lengths of the palm, does not move; and one
 # that goes less than this share as far as the other one tells less about timing than that.
 STILL_RANGE, LEAST_RANGE_SHARE = 0.1, 0.1
-# The band of pass 2 is not wider, in seconds, however long the clips.
-MOST_BAND_S = 10.0
-# Beside a pin, a matched warp may move by its tolerance and this share of the time to the pin.
-FREEDOM_SHARE = 0.25
-# Rounds of matching signs with the hand clip in the body's time.
-ROUNDS = 2
-# Of a hand's alignment, for whoever watches: the path of pass 1, its rounds, and pass 2.
-STEPS = 1 + ROUNDS + 1
+
+Ranges = tuple[tuple[float, float], ...]
 
 
 @displayed(
@@ -65,6 +56,9 @@ class Alignment:
     cost : of the path of pass 1, mean over the body's frames
     phases : how well each phase of the motion agrees
     origins : joints that the markers of body and hand clip were measured from
+    frozen : first and last seconds of what the recordings of body and hand clip lack
+    shared : whether both hands told one timing
+    contradictions : pins that motion speaks against
     taken_from : the other side, where this hand hardly moves and follows it
     channels : finger channels that were taken
     """
@@ -75,6 +69,9 @@ class Alignment:
     cost: float
     phases: tuple[Phase, ...]
     origins: tuple[str, str]
+    frozen: tuple[Ranges, Ranges] = ((), ())
+    shared: bool = False
+    contradictions: tuple[Contradiction, ...] = ()
     taken_from: Side | None = None
     channels: tuple[str, ...] = ()
 
@@ -167,59 +164,12 @@ def splice(
         if settings.wrist == "hands":
             clip = with_wrist(clip, hand_clip, body_hands, hand_hands, side, warp, exact)
         frames, other = body_hands.frames[side], hand_hands.frames[side]
-        clip, names = with_fingers(clip, hand_clip, frames, other, warp, exact)
+        clip, names = with_fingers(clip, hand_clip, frames, other, warp, exact, alignment.frozen[1])
         hands[side] = replace(alignment, channels=names)
+    problems += contradiction_notes(body, {s: a.contradictions for s, a in hands.items()})
+    problems += frozen_notes(body, hand_clip, {s: a.frozen for s, a in hands.items()})
     problems += held_pose_notes(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
     return Spliced(clip, hands, tuple(problems), settings)
-
-
-def align(
-    body: Markers,
-    hand: Markers,
-    settings: SpliceSettings,
-    pins: Sequence[Pin],
-    times: Array,
-    steps: Steps | None = None,
-) -> tuple[Array, Array, int]:
-    """Seconds of the hand clip (times,) after pass 2 and after pass 1, and the cost of pass 1.
-
-    It takes `STEPS` steps.
-    """
-    steps = steps or Steps(STEPS, None)
-    band = first_band(len(body), len(hand), settings, pins)
-    signs = settings.smoothing, settings.dead_zone
-    path = phase_path(body, hand, band, *signs, settings.align, settings.directions)
-    reach = min(settings.band[1] * len(body), MOST_BAND_S * settings.fps)
-    reach = max(reach, settings.least_band * settings.fps) / 2
-    if settings.align == "local":
-        near = band_along(path.first, path.last, band, reach)
-        path = path_with_steady_turns(body, hand, path, near, *signs, settings.directions)
-    steps.add()
-    own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps
-    freedom = _freedom(own_times, pins)
-    first = path.open_ended
-    for _ in range(ROUNDS):
-        first = through_pins(first / hand.fps, own_times, pins) * hand.fps
-        signs = settings.shared_smoothing, settings.dead_zone
-        first = rematched(
-            body, hand, first, freedom * body.fps, *signs, settings.align, settings.directions
-        )
-        steps.add()
-
-    def in_time(warp: Array) -> Array:
-        seconds = np.clip(np.interp(times, own_times, warp / hand.fps), 0.0, end)
-        return through_pins(seconds, times, pins)
-
-    if settings.tether == 0:
-        steps.add()
-        return in_time(first), in_time(first), path.cost
-    tether = settings.tether * hand.fps
-    first = through_pins(first / hand.fps, own_times, pins) * hand.fps
-    second = refined(
-        body, hand, first, np.minimum(freedom * hand.fps, reach), settings.align, tether
-    )
-    steps.add()
-    return in_time(second), in_time(first), path.cost
 
 
 def _exact_frames(alignment: Alignment) -> Array:
@@ -230,25 +180,6 @@ def _exact_frames(alignment: Alignment) -> Array:
     exact = np.zeros(len(times), bool)
     exact[frames[np.abs(at - frames) < 1e-3]] = True
     return exact
-
-
-def _freedom(times: Array, pins: Sequence[Pin]) -> Array:
-    """Seconds (times,) by which a warp that goes through all pins may still move.
-
-    Where a pin demands a jump, the hand clip as shown around it moves as no hand does, so that
-    matching it again would tell nothing.
-    """
-    freedom = np.full(len(times), np.inf)
-    for pin in pins:
-        away = np.maximum(np.abs(times - pin.body) - 0.75 * times[1], 0.0)
-        np.minimum(freedom, pin.tolerance + FREEDOM_SHARE * away, out=freedom)
-    return freedom
-
-
-def first_band(rows: int, columns: int, settings: SpliceSettings, pins: Sequence[Pin]) -> Band:
-    """Where the path of pass 1 may go."""
-    width = max(settings.band[0] * rows, settings.least_band * settings.fps)
-    return pinned_band(anchors_of(pins, rows, columns, settings.fps), width)
 
 
 def _aligned_hands(
@@ -274,12 +205,8 @@ def _aligned_hands(
     }
     enough = max(STILL_RANGE, LEAST_RANGE_SHARE * max(reach.values()))
     still = [side for side in pins if reach[side] < enough]
-    steps = Steps(STEPS * (len(pins) - len(still)), progress)
-    found = {
-        side: _aligned(*markers[side], settings, own, times, steps)
-        for side, own in pins.items()
-        if side not in still
-    }
+    moving = {side: both for side, both in markers.items() if side not in still}
+    found = _timings(moving, pins, settings, times, progress) if moving else {}
     problems: list[Problem] = []
     if not found:
         ends = body.duration, hand_clip.duration
@@ -306,38 +233,63 @@ def _aligned_hands(
             "--pin where the clips begin, where they end, and between."
         )
     for side in (s for s in still if s not in found):
-        [(moving, alignment)] = found.items()
-        found[side] = _aligned_like_other_hand(alignment, moving, pins[side], times)
+        other, alignment = next(iter(found.items()))
+        found[side] = _aligned_like_other_hand(alignment, other, pins[side], times)
         body_rests, hand_rests = (
             _wrist_range(m, settings.smoothing) < enough for m in markers[side]
         )
         where = "the hand clip" if not body_rests else "both clips" if hand_rests else "the body"
         message = (
-            f"the {side} hand hardly moves in {where}: it follows the timing of the {moving} one"
+            f"the {side} hand hardly moves in {where}: it follows the timing of the {other} one"
         )
         problems.append(Problem("follows-other-hand", message))
     return {side: found[side] for side in pins}, problems
 
 
-def _aligned(
+def _timings(
+    markers: Mapping[Side, MarkerPair],
+    pins: Mapping[Side, tuple[Pin, ...]],
+    settings: SpliceSettings,
+    times: Array,
+    progress: Progress | None,
+) -> dict[Side, Alignment]:
+    """Alignments of hands that move.
+
+    Both hands together say more about when than each alone. A hand has the timing that both
+    clips have with its own pins, so that a pin for one hand changes nothing of the other.
+    """
+    check_trunks(list(markers.values()), settings)
+    hands = list(markers)
+    runs = dict.fromkeys(pins[s] for s in hands)
+    steps = Steps(sum(hands_steps(len(hands), own) for own in runs), progress)
+    found = {
+        own: align_hands([markers[s] for s in hands], settings, own, times, steps) for own in runs
+    }
+    return {
+        s: _alignment(*markers[s], settings, pins[s], times, found[pins[s]][k])
+        for k, s in enumerate(hands)
+    }
+
+
+def _alignment(
     ours: Markers,
     theirs: Markers,
     settings: SpliceSettings,
     pins: tuple[Pin, ...],
     times: Array,
-    steps: Steps,
+    timing: Timing,
 ) -> Alignment:
-    if settings.align == "trunk" and any(m.facing is None for m in (ours, theirs)):
-        raise UsageError("A clip has no trunk to align by: use --align local.")
-    second, first, cost = align(ours, theirs, settings, pins, times, steps)
-    warp = np.interp(np.arange(len(ours)) / ours.fps, times, second)
+    warp = np.interp(np.arange(len(ours)) / ours.fps, times, timing.warp)
     return Alignment(
-        np.stack([times, second], axis=1),
-        first,
+        np.stack([times, timing.warp], axis=1),
+        timing.phase_warp,
         pins,
-        cost / len(ours),
+        timing.cost / len(ours),
         phase_qualities(ours, theirs, warp, settings.smoothing),
         (ours.origin, theirs.origin),
+        (ours.frozen, theirs.frozen),
+        timing.shared,
+        timing.contradictions,
     )
 
 

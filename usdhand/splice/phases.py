@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from usdhand.motion.rotations import Array
 from usdhand.splice.band import Band
 from usdhand.splice.markers import Markers, resample_markers
-from usdhand.splice.settings import Align, Directions
+from usdhand.splice.settings import Align, Directions, SignRule
 from usdhand.splice.warps import EXACT, monotone, whittaker_smoothed
 
 WINDOW = 5  # frames of the window that a turn about the vertical is fitted to
@@ -26,6 +26,9 @@ NEAR_S = 1 / 3
 SHIFT_S, FULL_EVIDENCE, LEAST_EVIDENCE = 0.1, 60.0, 0.02
 # How much a warp resists bending, beside a frame of full evidence.
 STIFFNESS = 500.0
+
+# Of the noise of white noise's derivatives only as much is a dead zone, in their RMS.
+MOST_NOISE_ZONE = 0.3
 
 _NO_TURN = np.zeros((1, 2, 1), np.float32), np.zeros((2, 1, 1), np.float32)
 
@@ -65,26 +68,18 @@ def phase_path(
     body: Markers,
     hand: Markers,
     band: Band,
-    smoothing: float,
-    dead_zone: float,
+    rule: SignRule,
     align: Align = "local",
-    directions: Directions = "spread",
 ) -> WarpPath:
-    """Least-cost path through a band under the sign cost, both hands at the same rate.
-
-    Parameters
-    ----------
-    smoothing : standard deviation of the Gaussian whose derivatives are taken, seconds
-    dead_zone : derivatives below this share of their RMS have the sign 0
-    """
+    """Least-cost path through a band under the sign cost, both hands at the same rate."""
     from usdhand.dtw import phases as phase_dtw
 
     turns = phase_dtw.turn_angles(TURNS) if align == "local" else np.zeros(1)
     if align == "trunk":
         body, hand = (in_trunk_axes(m) for m in (body, hand))
-    ours = derivative_signs(body, smoothing, dead_zone, np.zeros(1), directions)
-    theirs = derivative_signs(hand, smoothing, dead_zone, turns, directions)
-    windows = [_windows(m, smoothing, phase_dtw.BLOCK) for m in (body, hand)]
+    ours = derivative_signs(body, rule, np.zeros(1))
+    theirs = derivative_signs(hand, rule, turns)
+    windows = [_windows(m, rule.smoothing, phase_dtw.BLOCK) for m in (body, hand)]
     centred = windows[0] - windows[0].mean(axis=2, keepdims=True)
     first, last, cost = phase_dtw.phase_path(
         ours[0],
@@ -93,6 +88,7 @@ def phase_path(
         np.ascontiguousarray(windows[1].transpose(1, 2, 0), np.float32),
         band.low,
         band.high,
+        rule.rest_signs,
     )
     return WarpPath(first, last, int(cost))
 
@@ -102,9 +98,7 @@ def path_with_steady_turns(
     hand: Markers,
     path: WarpPath,
     band: Band,
-    smoothing: float,
-    dead_zone: float,
-    directions: Directions = "spread",
+    rule: SignRule,
 ) -> WarpPath:
     """The least-cost path near another one, with turns that change as slowly as performers do.
 
@@ -118,9 +112,10 @@ def path_with_steady_turns(
     from usdhand.dtw import phases as phase_dtw
 
     turned = facing(body, -steady_turns(body, hand, path.middle))
-    ours = derivative_signs(turned, smoothing, dead_zone, np.zeros(1), directions)
-    theirs = derivative_signs(hand, smoothing, dead_zone, np.zeros(1), directions)
-    first, last, cost = phase_dtw.phase_path(ours[0], theirs, *_NO_TURN, band.low, band.high)
+    ours, theirs = (derivative_signs(m, rule, np.zeros(1)) for m in (turned, hand))
+    first, last, cost = phase_dtw.phase_path(
+        ours[0], theirs, *_NO_TURN, band.low, band.high, rule.rest_signs
+    )
     return WarpPath(first, last, int(cost))
 
 
@@ -129,10 +124,8 @@ def rematched(
     hand: Markers,
     warp: Array,
     freedom: Array,
-    smoothing: float,
-    dead_zone: float,
+    rule: SignRule,
     align: Align = "local",
-    directions: Directions = "spread",
 ) -> Array:
     """Warp (rows,) in columns, matched again with the hand clip in the time that the warp gives it.
 
@@ -148,13 +141,13 @@ def rematched(
 
     rows = np.arange(len(body))
     ours, theirs = (
-        derivative_signs(m, smoothing, dead_zone, np.zeros(1), directions)
+        derivative_signs(m, rule, np.zeros(1))
         for m in align_about_vertical(body, resample_markers(hand, warp, body.fps), align)
     )
     reach = np.minimum(freedom, NEAR_S * body.fps).astype(np.int64)
     low = np.maximum.accumulate(np.maximum(rows - reach, 0))
     high = np.minimum.accumulate(np.minimum(rows + reach, rows[-1])[::-1])[::-1]
-    first, last, cost = phase_dtw.phase_path(ours[0], theirs, *_NO_TURN, low, high)
+    first, last, cost = phase_dtw.phase_path(ours[0], theirs, *_NO_TURN, low, high, rule.rest_signs)
     path = WarpPath(first, last, int(cost))
     weights = _evidence(ours[0], theirs[0], path.middle, SHIFT_S * body.fps)
     weights[[0, -1]] = 1.0
@@ -188,7 +181,8 @@ def _evidence(
 
 def steady_turns(body: Markers, hand: Markers, path: Array) -> Array:
     """(rows,) radians by which the hand clip turns onto the body along a path, equation (7)."""
-    around = np.eye(4) - 0.25  # markers less their mean
+    count = body.positions.shape[1]
+    around = np.eye(count) - 1.0 / count  # markers less their mean
     at = np.clip(np.rint(path), 0, len(hand) - 1).astype(np.intp)
     p, q = around @ body.positions, hand.positions[at]
     products = np.moveaxis(p, 1, 2) @ q  # axis of the body, axis of the hand
@@ -210,13 +204,7 @@ def smoothed(curve: Array, deviation: float, order: int = 0) -> Array:
     return np.asarray(gaussian_filter1d(curve, deviation, axis=0, order=order, mode="nearest"))
 
 
-def derivative_signs(
-    markers: Markers,
-    smoothing: float,
-    dead_zone: float,
-    turns: Array,
-    directions: Directions = "spread",
-) -> NDArray[np.uint64]:
+def derivative_signs(markers: Markers, rule: SignRule, turns: Array) -> NDArray[np.uint64]:
     """Signs of velocity and acceleration after turns about the vertical, as bits.
 
     Returns
@@ -226,25 +214,45 @@ def derivative_signs(
     from usdhand.dtw.phases import signs_along
 
     result = np.zeros((len(turns), 2, len(markers)), np.uint64)
-    axes = sign_axes(directions)
+    axes = sign_axes(rule.directions, markers.positions.shape[1])
     along = np.stack([_about_vertical(axes, -turn) for turn in turns]).astype(np.float32)
+    deviation = rule.smoothing * markers.fps
+    noise = _noise_of(markers.positions) if rule.noise_zone else 0.0
     for order in (1, 2):
-        derivative = smoothed(markers.positions, smoothing * markers.fps, order)
-        limit = dead_zone * np.sqrt(3.0 * np.mean(derivative**2))
+        derivative = smoothed(markers.positions, deviation, order)
+        rms = np.sqrt(3.0 * np.mean(derivative**2))
+        noisy = rule.noise_zone * noise * _noise_gain(deviation, order)
+        limit = max(rule.dead_zone * rms, min(noisy, MOST_NOISE_ZONE * rms))
         by_frame = np.ascontiguousarray(np.moveaxis(derivative, 0, 2), np.float32)
         signs_along(by_frame, along, float(limit), result)
     return result
 
 
-def sign_axes(directions: Directions) -> Array:
+def _noise_of(curves: Array) -> float:
+    """Standard deviation of white noise on smooth curves (frames, ...), from third differences."""
+    if len(curves) < 4:
+        return 0.0
+    third = np.abs(np.diff(curves, 3, axis=0))
+    return float(np.median(third) / 0.6745 / np.sqrt(20.0))
+
+
+def _noise_gain(deviation: float, order: int) -> float:
+    """Standard deviation of a Gaussian derivative of white noise, beside that of the noise."""
+    if order == 1:
+        return float(np.sqrt(1.0 / (4.0 * np.sqrt(np.pi) * deviation**3)))
+    return float(np.sqrt(3.0 / (8.0 * np.sqrt(np.pi) * deviation**5)))
+
+
+def sign_axes(directions: Directions, markers: int = 4) -> Array:
     """(markers, axes, 3) unit directions along which the signs of a marker are taken.
 
     ``axes`` are the paper's x, y and z. With ``spread`` every marker has eight directions, turned
     by another angle about the vertical: markers of a hand mostly move alike, so that their signs
-    along the same axes change together and say less about when. Still nothing but signs.
+    along the same axes change together and say less about when. Still nothing but signs. Eight
+    markers, those of both hands, have four directions each, so that there are as many signs.
     """
     if directions == "axes":
-        return np.tile(np.eye(3), (4, 1, 1))
+        return np.tile(np.eye(3), (markers, 1, 1))
     half = np.sqrt(0.5)
     axes = np.array(
         [
@@ -256,7 +264,11 @@ def sign_axes(directions: Directions) -> Array:
             [0, -half, half],
         ]
     )
-    return np.stack([_about_vertical(axes, np.radians(a)) for a in (0.0, 45.0, 22.5, 67.5)])
+    turns = [np.radians(a) for a in (0.0, 45.0, 22.5, 67.5)]
+    if markers == 4:
+        return np.stack([_about_vertical(axes, turn) for turn in turns])
+    parts = axes[[0, 1, 2, 4]], axes[[3, 6, 5, 1]]
+    return np.stack([_about_vertical(parts[k % 2], turns[k % 4]) for k in range(markers)])
 
 
 def in_trunk_axes(markers: Markers) -> Markers:

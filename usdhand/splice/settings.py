@@ -40,6 +40,26 @@ class Pin:
         return self.name or f"{self.body:g} s : {self.hand:g} s"
 
 
+@dataclass(frozen=True)
+class SignRule:
+    """How motion becomes signs.
+
+    Attributes
+    ----------
+    smoothing : standard deviation of the Gaussian whose derivatives are taken, seconds
+    dead_zone : derivatives below this share of their RMS have the sign 0
+    noise_zone : and those below this many standard deviations of their noise
+    rest_signs : a frame with at most as many of 64 signs that are not 0 rests
+    directions : along which signs are taken, see `usdhand.splice.phases.sign_axes`
+    """
+
+    smoothing: float
+    dead_zone: float
+    noise_zone: float
+    rest_signs: int
+    directions: Directions
+
+
 def read_band(text: str) -> tuple[float, float]:
     """Read two numbers with a comma between.
 
@@ -83,7 +103,10 @@ class SpliceSettings:
     fps : rate at which motion is compared
     smoothing : of positions before derivatives are taken, standard deviation in seconds
     shared_smoothing : the same, as soon as both clips are in the body's time
-    dead_zone : share of their RMS below which derivatives count as zero
+    dead_zone, noise_zone : shares of their RMS, and of their noise, below which derivatives count
+        as zero
+    rest_signs : signs that are not zero up to which a frame rests; a rest uses up frames of its own
+        clip only; below 0: none does
     tether : seconds of the hand clip that pass 2 may typically move pass 1 by; 0: no pass 2
     """
 
@@ -107,6 +130,8 @@ class SpliceSettings:
     smoothing: float = 0.045
     shared_smoothing: float = 0.065
     dead_zone: float = 0.06
+    noise_zone: float = 2.1
+    rest_signs: int = 16
     tether: float = 0.3
 
     def __post_init__(self) -> None:
@@ -117,6 +142,11 @@ class SpliceSettings:
             if not least <= (value := getattr(self, name)) <= most:
                 raise UsageError(f"{name} is {value:g}; it must be from {least:g} to {most:g}.")
 
+    def rule(self, smoothing: float) -> SignRule:
+        """How motion becomes signs with this smoothing."""
+        zones = self.dead_zone, self.noise_zone
+        return SignRule(smoothing, *zones, self.rest_signs, self.directions)
 
-# Signs along x, y and z only, as the paper has them.
-PAPER = SpliceSettings(directions="axes")
+
+# Signs along x, y and z only, and rests as any motion, as the paper has them.
+PAPER = SpliceSettings(directions="axes", noise_zone=0.0, rest_signs=-1)

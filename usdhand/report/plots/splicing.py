@@ -15,9 +15,10 @@ from usdhand.motion.rotations import Array
 from usdhand.report.plots import style
 from usdhand.report.plots.style import BLACK, GREY, ORANGE, SKY, styled
 from usdhand.splice.markers import Markers, hand_markers
-from usdhand.splice.method import Alignment, Spliced, first_band
+from usdhand.splice.method import Alignment, Spliced
 from usdhand.splice.phases import derivative_signs, facing, in_trunk_axes, steady_turns
 from usdhand.splice.settings import SpliceSettings
+from usdhand.splice.timing import first_band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -140,9 +141,7 @@ def cost_grid(
         pair = facing(ours, -steady_turns(ours, theirs, warp)), theirs
     blocks, borders = [], []
     for markers, (start, end) in zip(pair, shown, strict=True):
-        words = derivative_signs(
-            markers, settings.smoothing, settings.dead_zone, np.zeros(1), settings.directions
-        )
+        words = derivative_signs(markers, settings.rule(settings.smoothing), np.zeros(1))
         first, last = int(start * markers.fps), int(np.ceil(end * markers.fps))
         signs = _signs(words[0][:, first : last + 1])
         edges = np.linspace(0, len(signs), min(len(signs), CELLS) + 1).round().astype(np.intp)
