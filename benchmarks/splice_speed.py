@@ -30,7 +30,7 @@ from usdhand.splice.band import pinned_band
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.phases import smoothed
 from usdhand.splice.settings import SpliceSettings
-from usdhand.splice.timing import align
+from usdhand.splice.timing import align_hands
 
 HERE = Path(__file__).resolve().parent.parent
 REAL = HERE.parent / "shared" / "data" / "studiogalt" / "full"
@@ -135,14 +135,14 @@ def pair(takes: list[Markers], frames: int) -> tuple[Markers, Markers]:
 def measured(takes: list[Markers], frames: int) -> tuple[float, int, float]:
     """Seconds, cells of pass 1, and MB of peak memory above what the clips take."""
     short = pair(takes, 300)
-    align([short], SETTINGS, (), np.arange(300) / SETTINGS.fps)  # compiled
+    align_hands([short], SETTINGS, (), np.arange(300) / SETTINGS.fps)  # compiled
     body, hand = pair(takes, frames)
     band = pinned_band(((0, 0, 0), (frames - 1, frames - 1, 0)), SETTINGS.band[0] * frames)
     before = peak_mb()
     best = np.inf
     for _ in range(1 if frames > 10000 else 5):
         start = time.perf_counter()
-        align([(body, hand)], SETTINGS, (), np.arange(frames) / SETTINGS.fps)
+        align_hands([(body, hand)], SETTINGS, (), np.arange(frames) / SETTINGS.fps)
         best = min(best, time.perf_counter() - start)
     return best, band.cells, peak_mb() - before
 

@@ -181,13 +181,12 @@ def _evidence(
 
 def steady_turns(body: Markers, hand: Markers, path: Array) -> Array:
     """(rows,) radians by which the hand clip turns onto the body along a path, equation (7)."""
-    count = body.positions.shape[1]
-    around = np.eye(count) - 1.0 / count  # markers less their mean
     at = np.clip(np.rint(path), 0, len(hand) - 1).astype(np.intp)
-    p, q = around @ body.positions, hand.positions[at]
-    products = np.moveaxis(p, 1, 2) @ q  # axis of the body, axis of the hand
-    cosine = products[:, 0, 0] + products[:, 2, 2]
-    sine = products[:, 0, 2] - products[:, 2, 0]
+    p = body.positions - body.positions.mean(axis=1, keepdims=True)
+    q = hand.positions[at]
+    (px, pz), (qx, qz) = ((v[..., 0], v[..., 2]) for v in (p, q))
+    cosine = np.sum(px * qx + pz * qz, axis=1)
+    sine = np.sum(px * qz - pz * qx, axis=1)
     both = smoothed(np.stack([cosine, sine], axis=1), STEADY_S * body.fps)
     return np.asarray(np.arctan2(both[:, 1], both[:, 0]))
 

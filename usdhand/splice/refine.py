@@ -25,6 +25,8 @@ SMOOTHING_S, AROUND_S, AMPLITUDE_S, NOISE_S = 0.033, 1.0, 0.75, 0.33
 BANDS_S = (SMOOTHING_S, 0.09, 0.25, 0.7)
 # Differences below these, in radians and lengths of the palm, are no smaller noise.
 LEAST_ANGLE, LEAST_PATH = np.radians(1.0), 0.005
+# Bends, palms and paths.
+KINDS = 3
 # Of their squares, at least this share is in a band.
 LEAST_SHARE = 0.05
 # Differences are white noise if those of the slowest band have less than this many times the power
@@ -108,15 +110,30 @@ def refined(
         for again in range(stage.rounds):
             now = monotone(warp + moved)
             found = [evidence(*p, now, align, stage.bands, again > 0) for p in pairs]
-            information = np.sum([e.information for e in found], axis=0)
-            pull = np.sum([e.pull for e in found], axis=0)
-            weights = information + held
-            wanted = (information * moved + pull) / weights
-            stiffness = stage.stiffness * (fps / 60.0) ** 4
-            moved = whittaker_smoothed(wanted, weights, stiffness, warp)
+            moved = _stepped(found, moved, held, stage.stiffness * (fps / 60.0) ** 4, warp)
             moved = np.clip(moved, least - warp, most - warp)
         warp = np.clip(monotone(warp + moved), least, most)
     return warp
+
+
+def stepped(warp: Array, freedom: Array, found: Sequence[Evidence], fps: float) -> Array:
+    """The warp (rows,) after one step of the last stage."""
+    stage = STAGES[-1]
+    assert stage.tether is not None
+    held = np.where(freedom > 0, 1.0 / (stage.tether * fps) ** 2, EXACT)
+    stiffness = stage.stiffness * (fps / 60.0) ** 4
+    moved = _stepped(found, np.zeros(len(warp)), held, stiffness, warp)
+    return monotone(warp + np.clip(moved, -freedom, freedom))
+
+
+def _stepped(
+    found: Sequence[Evidence], moved: Array, held: Array, stiffness: float, warp: Array
+) -> Array:
+    """By how much a warp should move, from what was found where it has moved already."""
+    information = np.sum([e.information for e in found], axis=0)
+    weights = information + held
+    wanted = (information * moved + np.sum([e.pull for e in found], axis=0)) / weights
+    return whittaker_smoothed(wanted, weights, stiffness, warp)
 
 
 def evidence(
@@ -126,6 +143,7 @@ def evidence(
     align: Align,
     bands: Sequence[float] = BANDS_S,
     local: bool = True,
+    kinds: Sequence[int] = range(KINDS),
 ) -> Evidence:
     """What the motion of a hand says about a warp (rows,) in hand clip frames.
 
@@ -133,13 +151,14 @@ def evidence(
     ----------
     bands : borders of the bands that are compared, seconds
     local : whether differences count as noise where they are, or on the whole
+    kinds : of bends, palms and paths, which are compared
     """
     fps = body.fps
     slope = np.maximum(np.gradient(warp), 0.1)[:, None]
     seen = body.seen * np.interp(warp, np.arange(len(hand)), hand.seen)
     information, pull = np.zeros(len(body)), np.zeros(len(body))
     pair = align_about_vertical(body, resample_markers(hand, warp, fps), align)
-    for ours, theirs, least in _compared(*pair):
+    for ours, theirs, least in _compared(*pair, kinds):
         for band in _bands(ours, theirs, bands, fps):
             change, apart = np.gradient(band.ours, axis=0) / slope, band.ours - band.theirs
             squares = _dot(apart, apart) / apart.shape[1]
@@ -192,17 +211,23 @@ def differences(body: Markers, hand: Markers, warp: Array, align: Align) -> Arra
     return np.array([max(float(squares.mean()), least**2) for squares, least in found])
 
 
-def row_differences(body: Markers, hand: Markers, warp: Array, align: Align) -> Array:
+def row_differences(
+    body: Markers, hand: Markers, warp: Array, align: Align, kinds: Sequence[int] = range(KINDS)
+) -> Array:
     """(rows,) squared differences of bends, palms and paths, in those that are no smaller noise."""
-    found = _squares(body, hand, warp, align)
+    found = _squares(body, hand, warp, align, kinds)
     return np.asarray(np.sum([squares / least**2 for squares, least in found], axis=0))
 
 
 def _squares(
-    body: Markers, hand: Markers, warp: Array, align: Align
+    body: Markers,
+    hand: Markers,
+    warp: Array,
+    align: Align,
+    kinds: Sequence[int] = range(KINDS),
 ) -> Iterator[tuple[Array, float]]:
     pair = align_about_vertical(body, resample_markers(hand, warp, body.fps), align)
-    for ours, theirs, least in _compared(*pair):
+    for ours, theirs, least in _compared(*pair, kinds):
         yield _dot(ours - theirs, ours - theirs) / ours.shape[1], least
 
 
@@ -211,24 +236,29 @@ def _smoother(curve: Array, before: float, after: float, fps: float) -> Array:
     return smoothed(curve, np.sqrt(after**2 - before**2) * fps) if after > before else curve
 
 
-def _compared(body: Markers, hand: Markers) -> Iterator[tuple[Array, Array, float]]:
+def _compared(
+    body: Markers, hand: Markers, kinds: Sequence[int]
+) -> Iterator[tuple[Array, Array, float]]:
     """Curves (rows, n) of both hands in the same axes and time, and differences that are noise."""
     fps = body.fps
 
     def around(curve: Array) -> Array:
         return np.asarray(curve - smoothed(curve, AROUND_S * fps))
 
-    ours, theirs = (around(unit(smoothed(m.forearm, SMOOTHING_S * fps))) for m in (body, hand))
-    yield ours, theirs, LEAST_ANGLE
+    if 0 in kinds:
+        ours, theirs = (around(unit(smoothed(m.forearm, SMOOTHING_S * fps))) for m in (body, hand))
+        yield ours, theirs, LEAST_ANGLE
     positions = [smoothed(m.positions, SMOOTHING_S * fps) for m in (body, hand)]
     wrists = [(p[:, 0] + p[:, 1]) / 2 for p in positions]
-    palms = (unit(p[:, [0, 3]] - w[:, None]) for p, w in zip(positions, wrists, strict=True))
-    ours, theirs = (around(p.reshape(len(p), -1)) for p in palms)
-    yield ours, theirs, LEAST_ANGLE
-    ours, theirs = (around(w) for w in wrists)
-    both = np.stack([_dot(ours, theirs), _dot(theirs, theirs)], axis=1)
-    both = np.maximum(smoothed(both, AMPLITUDE_S * fps), 1e-9)
-    yield ours, theirs * (both[:, :1] / both[:, 1:]), LEAST_PATH * body.palm_length
+    if 1 in kinds:
+        palms = (unit(p[:, [0, 3]] - w[:, None]) for p, w in zip(positions, wrists, strict=True))
+        ours, theirs = (around(p.reshape(len(p), -1)) for p in palms)
+        yield ours, theirs, LEAST_ANGLE
+    if 2 in kinds:
+        ours, theirs = (around(w) for w in wrists)
+        both = np.stack([_dot(ours, theirs), _dot(theirs, theirs)], axis=1)
+        both = np.maximum(smoothed(both, AMPLITUDE_S * fps), 1e-9)
+        yield ours, theirs * (both[:, :1] / both[:, 1:]), LEAST_PATH * body.palm_length
 
 
 def _dot(a: Array, b: Array) -> Array:

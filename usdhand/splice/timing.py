@@ -16,7 +16,8 @@ from usdhand.splice.phases import path_with_steady_turns, phase_path, rematched
 from usdhand.splice.reach import Contradiction, bounded, contradictions, is_local
 from usdhand.splice.refine import OWN_STAGES, MarkerPair, differences, evidence, refined
 from usdhand.splice.settings import Pin, SpliceSettings
-from usdhand.splice.warps import through_pins
+from usdhand.splice.trust import trust
+from usdhand.splice.warps import monotone, through_pins
 
 # The band of pass 2 is not wider, in seconds, however long the clips.
 MOST_BAND_S = 10.0
@@ -43,8 +44,8 @@ class Timing:
     ----------
     warp, phase_warp : (times,) seconds of the hand clip after pass 2 and after pass 1
     cost : of the path of pass 1, summed
-    rows, shared_rows : (marker rows,) in frames of the hand's markers, the warp, and what all hands
-        together told
+    rows, phase_rows, shared_rows : (marker rows,) in frames of the hand's markers: the warp, that
+        of pass 1, and what all hands together told
     shared : whether there were several
     contradictions : pins that motion speaks against
     """
@@ -53,6 +54,7 @@ class Timing:
     phase_warp: Array
     cost: int
     rows: Array
+    phase_rows: Array
     shared_rows: Array
     shared: bool = False
     contradictions: tuple[Contradiction, ...] = ()
@@ -78,13 +80,12 @@ def align(
     band = first_band(len(body), len(hand), settings, pins)
     rule = settings.rule(settings.smoothing)
     path = phase_path(body, hand, band, rule, settings.align)
-    reach = min(settings.band[1] * len(body), MOST_BAND_S * settings.fps)
-    reach = max(reach, settings.least_band * settings.fps) / 2
+    reach = _reach(len(body), settings) * settings.fps
     if settings.align == "local":
         near = band_along(path.first, path.last, band, reach)
         path = path_with_steady_turns(body, hand, path, near, rule)
     steps.add()
-    own_times, end = np.arange(len(body)) / body.fps, (len(hand) - 1) / hand.fps
+    own_times = np.arange(len(body)) / body.fps
     freedom = _freedom(own_times, pins)
     rule = settings.rule(settings.shared_smoothing)
     first = path.open_ended
@@ -93,23 +94,23 @@ def align(
         first = rematched(body, hand, first, freedom * body.fps, rule, settings.align)
         steps.add()
 
-    def in_time(warp: Array) -> Array:
-        seconds = np.clip(np.interp(times, own_times, warp / hand.fps), 0.0, end)
-        return through_pins(seconds, times, pins)
-
-    phase_warp, cost = in_time(first), path.cost // len(pairs)
+    shared, cost = len(pairs) > 1, path.cost // len(pairs)
+    phase_warp = _in_time(first, hand, times, pins)
     if settings.tether == 0:
         steps.add()
-        return (Timing(phase_warp, phase_warp, cost, first, first, len(pairs) > 1),) * len(pairs)
+        return (Timing(phase_warp, phase_warp, cost, first, first, first, shared),) * len(pairs)
     tether = settings.tether * hand.fps
     first = through_pins(first / hand.fps, own_times, pins) * hand.fps
     freedom = np.minimum(freedom * hand.fps, reach)
     second = refined(pairs, first, freedom, settings.align, tether)
     rows = [second]
-    if len(pairs) > 1:
+    if shared:
         rows = [refined([p], second, freedom, settings.align, tether, OWN_STAGES) for p in pairs]
     steps.add()
-    return tuple(Timing(in_time(r), phase_warp, cost, r, second, len(pairs) > 1) for r in rows)
+    return tuple(
+        Timing(_in_time(r, hand, times, pins), phase_warp, cost, r, first, second, shared)
+        for r in rows
+    )
 
 
 def align_hands(
@@ -127,13 +128,15 @@ def align_hands(
     steps = steps or Steps(hands_steps(len(pairs), pins), None)
     free = _suiting(pairs, settings, (), times, steps)
     if not pins:
-        return free
+        return _trusted(pairs, free, settings, times, pins)
     local = [is_local(t.warp, times, pins) for t in free]
     if all(local):
         groups = [pairs] if free[0].shared else [[p] for p in pairs]
         pinned = [t for group in groups for t in align(group, settings, pins, times, steps)]
     else:
         pinned = list(_suiting(pairs, settings, pins, times, steps))
+    free = _trusted(pairs, free, settings, times, ())
+    pinned = list(_trusted(pairs, pinned, settings, times, pins))
     for k, (pair, own) in enumerate(zip(pairs, free, strict=True)):
         if local[k]:
             warp = bounded(pair, own.warp, pinned[k].warp, times, pins, settings.align)
@@ -160,6 +163,31 @@ def _suiting(
         return alone
     together = align(pairs, settings, pins, times, steps)
     return together if _in_step(pairs, alone, together, settings) else alone
+
+
+def _trusted(
+    pairs: Sequence[MarkerPair],
+    found: Sequence[Timing],
+    settings: SpliceSettings,
+    times: Array,
+    pins: Sequence[Pin],
+) -> tuple[Timing, ...]:
+    """Timings that are those of pass 1 where pass 2 does not hold."""
+    if settings.tether == 0:
+        return tuple(found)
+    groups = [range(len(pairs))] if found[0].shared else [[k] for k in range(len(pairs))]
+    result = []
+    for group in groups:
+        own = np.arange(len(found[0].rows)) / settings.fps
+        freedom = np.minimum(_freedom(own, pins), _reach(len(own), settings)) * settings.fps
+        first = [found[k].phase_rows for k in group]
+        weight = trust([pairs[k] for k in group], first, freedom, settings.align)
+        for k in group:
+            t = found[k]
+            rows = monotone(t.phase_rows + weight * (t.rows - t.phase_rows))
+            warp = _in_time(rows, pairs[k][1], times, pins)
+            result.append(replace(t, rows=rows, warp=warp))
+    return tuple(result)
 
 
 def _in_step(
@@ -197,11 +225,24 @@ def check_trunks(pairs: Sequence[MarkerPair], settings: SpliceSettings) -> None:
         raise UsageError("A clip has no trunk to align by: use --align local.")
 
 
+def _in_time(rows: Array, hand: Markers, times: Array, pins: Sequence[Pin]) -> Array:
+    """Seconds of the hand clip (times,) of a warp in its marker frames, through pins."""
+    own, end = np.arange(len(rows)) / hand.fps, (len(hand) - 1) / hand.fps
+    seconds = np.clip(np.interp(times, own, rows / hand.fps), 0.0, end)
+    return through_pins(seconds, times, pins)
+
+
 def _together(hands: Sequence[Markers]) -> Markers:
     """Markers of several hands as if they were those of one."""
     if len(hands) == 1:
         return hands[0]
     return replace(hands[0], positions=np.concatenate([m.positions for m in hands], axis=1))
+
+
+def _reach(rows: int, settings: SpliceSettings) -> float:
+    """Seconds by which pass 2 may move a warp."""
+    most = min(settings.band[1] * rows / settings.fps, MOST_BAND_S)
+    return max(most, settings.least_band) / 2
 
 
 def _freedom(times: Array, pins: Sequence[Pin]) -> Array:
