@@ -94,8 +94,13 @@ def test_a_splice_report_retimes_its_hand_clip(results: Results, tmp_path: Path)
         results.splice_report, "-o", page)  # fmt: skip
     data = page_data(page)
     report = json.loads(results.splice_report.read_text())["hands"]
-    assert [r["label"] for r in data["rows"]] == ["phases", "seconds of hand clip"] * len(report)
-    phases, seconds = data["rows"][:2]
+    unsure = {r["side"]: r["spans"] for r in data["rows"] if r["label"] == "may be off"}
+    assert {s: len(spans) for s, spans in unsure.items()} == {
+        s: len(hand["doubts"]) for s, hand in report.items() if hand["doubts"]
+    }
+    rows = [r for r in data["rows"] if r["label"] != "may be off"]
+    assert [r["label"] for r in rows] == ["phases", "seconds of hand clip"] * len(report)
+    phases, seconds = rows[:2]
     assert len(phases["spans"]) == len(report["left"]["phases"])
     assert len(phases["marks"]) == len(report["left"]["pins"]) == 1
     body, hand = np.array(report["left"]["warp"]).T

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from usdhand.motion import Clip
 from usdhand.report.document import rounded
 from usdhand.report.text import written_to
@@ -17,6 +19,7 @@ def splice_result(spliced: Spliced) -> dict[str, Any]:
     body = spliced.clip
     return {
         "hands": {side: _hand_data(alignment, body) for side, alignment in spliced.hands.items()},
+        "pins_wanted": _pins_wanted(spliced),
         "notes": [str(problem) for problem in spliced.problems],
         "fps": rounded(body.fps),
         "frames": len(body),
@@ -37,10 +40,34 @@ def summary(result: Mapping[str, Any], verbose: bool) -> str:
         if hand["look_at"]:
             frames = ", ".join(f"{frame:g}" for frame in hand["look_at"])
             lines.append(f"  low agreement, consider a --pin, near time codes {frames}")
+        for d in hand["doubts"]:
+            lines.append(
+                f"  look at {d['start']:.1f} to {d['end']:.1f} s, {side} hand: off by up to "
+                f"{d['off']:.1f} s"
+            )
         for p in hand["phases"] if verbose else ():
             quality = "holds" if p["quality"] is None else f"agreement {p['quality']:.2f}"
             lines.append(f"  {p['start']:7.2f} to {p['end']:7.2f} s: {quality}")
+    if result["pins_wanted"]:
+        wanted = ", ".join(f"{p['time_code']:g} ({p['side']})" for p in result["pins_wanted"])
+        lines.append(f"pins would help most at the body's time codes {wanted}")
     return "\n".join([*lines, written_to(result)])
+
+
+def _pins_wanted(spliced: Spliced) -> list[dict[str, Any]]:
+    """Where pins would help most, in this order, with what is shown there now."""
+    found = [
+        {
+            "side": side,
+            "body": rounded(p.start),
+            "time_code": rounded(_time_code(spliced.clip, p.start)),
+            "hand": rounded(float(np.interp(p.start, *alignment.warp.T))),
+            "off": rounded(p.off),
+        }
+        for side, alignment in spliced.hands.items()
+        for p in alignment.wanted_pins
+    ]
+    return sorted(found, key=lambda p: -p["off"])
 
 
 def _hand_data(alignment: Alignment, body: Clip) -> dict[str, Any]:
@@ -51,6 +78,13 @@ def _hand_data(alignment: Alignment, body: Clip) -> dict[str, Any]:
         "pass_lag": rounded(alignment.pass_lag),
         "taken_from": alignment.taken_from,
         "measured_from": {"body": alignment.origins[0], "hands": alignment.origins[1]},
+        "deviation": None
+        if alignment.deviation is None
+        else [rounded(d) for d in alignment.deviation],
+        "doubts": [
+            {"start": rounded(d.start), "end": rounded(d.end), "off": rounded(d.off)}
+            for d in alignment.doubts
+        ],
         "one_timing": alignment.shared,
         "frozen": {
             clip: [[rounded(a), rounded(b)] for a, b in ranges]

@@ -15,6 +15,7 @@ from usdhand.motion.rotations import Array
 from usdhand.problems import Problem
 from usdhand.progress import Progress, Steps
 from usdhand.splice.band import checked_pins
+from usdhand.splice.confidence import Doubt, doubts, wanted_pins
 from usdhand.splice.finger_notes import frozen_notes, held_pose_notes, still_finger_notes
 from usdhand.splice.lengths import length_notes, pin_advice
 from usdhand.splice.markers import Markers, hand_markers
@@ -59,6 +60,7 @@ class Alignment:
     frozen : first and last seconds of what the recordings of body and hand clip lack
     shared : whether both hands told one timing
     contradictions : pins that motion speaks against
+    deviation : (body frames,) standard deviation of the warp in seconds, None if nothing tells it
     taken_from : the other side, where this hand hardly moves and follows it
     channels : finger channels that were taken
     """
@@ -72,6 +74,7 @@ class Alignment:
     frozen: tuple[Ranges, Ranges] = ((), ())
     shared: bool = False
     contradictions: tuple[Contradiction, ...] = ()
+    deviation: Array | None = None
     taken_from: Side | None = None
     channels: tuple[str, ...] = ()
 
@@ -79,6 +82,20 @@ class Alignment:
     def pass_lag(self) -> float:
         """Median seconds by which pass 2 moved the warp of pass 1."""
         return float(np.median(np.abs(self.warp[:, 1] - self.phase_warp)))
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Ranges of the body that move, and in which the timing may be off visibly."""
+        if self.deviation is None:
+            return ()
+        return doubts(self.warp[:, 0], self.deviation, self.phases)
+
+    @property
+    def wanted_pins(self) -> tuple[Doubt, ...]:
+        """Moments of the body at which pins would help most, in this order."""
+        if self.deviation is None or self.taken_from is not None:
+            return ()
+        return wanted_pins(self.warp[:, 0], self.deviation, self.phases)
 
 
 @displayed(
@@ -290,6 +307,7 @@ def _alignment(
         (ours.frozen, theirs.frozen),
         timing.shared,
         timing.contradictions,
+        timing.deviation,
     )
 
 

@@ -11,6 +11,7 @@ from usdhand.errors import UsageError
 from usdhand.motion.rotations import Array
 from usdhand.progress import Steps
 from usdhand.splice.band import Band, anchors_of, band_along, pinned_band
+from usdhand.splice.confidence import deviation
 from usdhand.splice.markers import Markers
 from usdhand.splice.phases import path_with_steady_turns, phase_path, rematched
 from usdhand.splice.reach import Contradiction, bounded, contradictions, is_local
@@ -47,6 +48,9 @@ class Timing:
     rows, phase_rows, shared_rows : (marker rows,) in frames of the hand's markers: the warp, that
         of pass 1, and what all hands together told
     shared : whether there were several
+    other_rows : (marker rows,) the same of what was not taken, None if there was nothing else: what
+        the hand tells on its own, or both together
+    deviation : (times,) standard deviation of the warp in seconds, None without pass 2
     contradictions : pins that motion speaks against
     """
 
@@ -57,6 +61,8 @@ class Timing:
     phase_rows: Array
     shared_rows: Array
     shared: bool = False
+    other_rows: Array | None = None
+    deviation: Array | None = None
     contradictions: tuple[Contradiction, ...] = ()
 
 
@@ -162,7 +168,9 @@ def _suiting(
     if len(pairs) == 1:
         return alone
     together = align(pairs, settings, pins, times, steps)
-    return together if _in_step(pairs, alone, together, settings) else alone
+    both = alone, together
+    taken, other = both[::-1] if _in_step(pairs, alone, together, settings) else both
+    return tuple(replace(t, other_rows=o.rows) for t, o in zip(taken, other, strict=True))
 
 
 def _trusted(
@@ -186,7 +194,9 @@ def _trusted(
             t = found[k]
             rows = monotone(t.phase_rows + weight * (t.rows - t.phase_rows))
             warp = _in_time(rows, pairs[k][1], times, pins)
-            result.append(replace(t, rows=rows, warp=warp))
+            spread = deviation(pairs[k], rows, t.phase_rows, t.other_rows, settings.align)
+            spread = np.minimum(np.interp(times, own, spread), _freedom(times, pins))
+            result.append(replace(t, rows=rows, warp=warp, deviation=spread))
     return tuple(result)
 
 

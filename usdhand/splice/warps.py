@@ -45,7 +45,22 @@ def _smoothed_with(values: Array, weights: Array, bend: Array) -> Array:
     """Curve of which bending costs as much at each inner frame."""
     from scipy.linalg import solveh_banded
 
-    bands = np.zeros((3, len(values)))
+    bands = _normal_bands(weights, bend)
+    return np.asarray(solveh_banded(bands, weights * values))
+
+
+def deviations(weights: Array, stiffness: float) -> Array:
+    """Standard deviations (n,) of a stiff curve whose values have these inverse variances."""
+    from usdhand.dtw.banded import inverse_diagonal
+
+    bands = _normal_bands(weights, np.full(len(weights) - 2, stiffness))
+    first, second = np.roll(bands[1], -1), np.roll(bands[0], -2)
+    return np.asarray(np.sqrt(np.maximum(inverse_diagonal(bands[2], first, second), 0.0)))
+
+
+def _normal_bands(weights: Array, bend: Array) -> Array:
+    """(3, n) normal equations of a stiff curve, as `scipy.linalg.solveh_banded` wants them."""
+    bands = np.zeros((3, len(weights)))
     bands[0, 2:] = bend
     bands[1, 1:-1] -= 2.0 * bend
     bands[1, 2:] -= 2.0 * bend
@@ -53,7 +68,7 @@ def _smoothed_with(values: Array, weights: Array, bend: Array) -> Array:
     bands[2, :-2] += bend
     bands[2, 1:-1] += 4.0 * bend
     bands[2, 2:] += bend
-    return np.asarray(solveh_banded(bands, weights * values))
+    return bands
 
 
 def monotone(warp: Array) -> Array:

@@ -177,9 +177,20 @@ def _splice_rows(side: str, hand: Mapping[str, Any]) -> list[dict[str, Any]]:
         }
         for p in hand["pins"]
     ]
+    doubts = [
+        {
+            "start": float(d["start"]),
+            "end": float(d["end"]),
+            "label": f"{d['off']:.1f} s",
+            "detail": f"look here: the timing may be off by up to {d['off']:.2f} s",
+            "look": True,
+        }
+        for d in hand["doubts"]
+    ]
     warp = np.asarray(hand["warp"], float)
     return [
         {"side": side, "label": "phases", "spans": spans, "marks": pins},
+        *([{"side": side, "label": "may be off", "spans": doubts, "marks": []}] if doubts else []),
         {
             "side": side,
             "label": "seconds of hand clip",
