@@ -266,3 +266,15 @@ def test_pins_tell_the_timing_of_arms_that_rest() -> None:
         assert np.interp(299 / 30, *alignment.warp.T) == pytest.approx(349 / 30)
     one = splice_hands(full, still, pins=["left:1:1", "left:680:680"])
     assert one.hands["right"].taken_from == "left"
+
+
+def test_pins_of_a_file_of_edits_are_those_of_the_option(run: Run, tmp_path: Path) -> None:
+    edits = tmp_path / "edits.json"
+    pins = [{"body": 1, "hand": 1}, {"body": 181, "hand": 403}]
+    edits.write_text(json.dumps({"schema": "usdhand.edits/1", "splice": {"pins": pins}}))
+    options = ("-n", "-o", tmp_path / "x.usda", "--json")
+    by_file = json.loads(run(BODY, HANDS, "--edits", edits, *options).stdout)
+    by_option = json.loads(run(BODY, HANDS, *PINS, *options).stdout)
+    assert by_file["hands"] == by_option["hands"]
+    assert [Path(i["path"]).name for i in by_file["inputs"]][2:] == ["edits.json"]
+    run(BODY, HANDS, "--edits", BODY, "-n", "-o", tmp_path / "x.usda", code=InputError.exit_code)

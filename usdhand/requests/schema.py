@@ -31,3 +31,4 @@ class SchemaRequest(Request):
     of_request: str | None = option(
         "Print the JSON schema of a verb's requests.", default=None, metavar="VERB"
     )
+    of_edits: bool = option("Print the JSON schema of files of edits.", default=False)

@@ -45,6 +45,10 @@ class SpliceRequest(Request):
         default=(),
         metavar="BODY:HAND[:TOL]",
     )
+    edits: Path | None = option(
+        "A file of edits (JSON) with more pins, as `usdhand schema --of-edits` describes it.",
+        default=None,
+    )
     settings: SpliceSettings = settings(SpliceSettings())
     side: shared.Sides = shared.side()
     flatten: bool = shared.flatten()

@@ -21,6 +21,8 @@ def run(request: SchemaRequest, journal: Journal) -> Outcome:
         found = request_schema(request_class(request.of_request))
     elif request.of_report is not None:
         found = report_schema(request.of_report)
+    elif request.of_edits:
+        found = _schema_file("edits") or {}
     else:
         folder = str(schema_folder())
         return Outcome(request, (), lambda: {"folder": folder}, lambda *_: folder)
@@ -36,9 +38,16 @@ def report_schema(verb: str) -> dict[str, Any]:
         if there is no such verb, or it makes no report.
     """
     request_class(verb)
-    name = f"{verb.split()[0]}.json"
-    file = resources.files("usdhand.report").joinpath("schemas", name)
-    if not file.is_file():
+    schema = _schema_file(verb.split()[0])
+    if schema is None:
         raise UsageError(f"'{verb}' makes no report.")
+    return schema
+
+
+def _schema_file(name: str) -> dict[str, Any] | None:
+    """A JSON schema of the package, None if there is none of the name."""
+    file = resources.files("usdhand.report").joinpath("schemas", f"{name}.json")
+    if not file.is_file():
+        return None
     schema: dict[str, Any] = json.loads(file.read_text("utf-8"))
     return schema

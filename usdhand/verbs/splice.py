@@ -24,6 +24,7 @@ from usdhand.progress import Progress
 from usdhand.report.plots import splicing as plotting
 from usdhand.report.plots.style import check_plots
 from usdhand.report.splice import splice_result, summary
+from usdhand.requests.edits import read_pins
 from usdhand.requests.shared import sides
 from usdhand.requests.splice import SpliceRequest
 from usdhand.rigs import Conventions, load_conventions
@@ -179,11 +180,12 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
     for read in (clip, hand_clip):
         journal.about(read.origin.path, read.problems, "warning")
         journal.about(read.origin.path, misleading_names(read, conventions), "warning")
+    pins = (*request.pins, *(read_pins(request.edits) if request.edits else ()))
     spliced = splice_hands(
         clip,
         hand_clip,
         request.settings,
-        pins=request.pins,
+        pins=pins,
         sides=sides(request.side),
         conventions=conventions,
         progress=journal.progress("splicing"),
@@ -211,10 +213,10 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
 
     return Outcome(
         request,
-        (body, hands, *request.maps),
+        (body, hands, *([request.edits] if request.edits else []), *request.maps),
         report,
         summary,
-        settings={"pins": list(request.pins)},
+        settings={"pins": list(pins)},
         figures=figures,
         written=() if request.dry_run else (output,),
     )
