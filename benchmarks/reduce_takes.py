@@ -26,12 +26,12 @@ from usdhand.motion.rotations import Array
 from usdhand.reduce.choose import subsets
 from usdhand.reduce.curve import error_curve
 from usdhand.reduce.errors import Errors, pca_rms
-from usdhand.reduce.evidence import Evidence, gather
+from usdhand.reduce.evidence import Takes, gather
 from usdhand.reduce.fit import Statistics
 from usdhand.reduce.method import apply_rig, fit_rig, fit_to
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.search import thresholds_for_count
-from usdhand.reduce.settings import PRESETS, Choice, Fit, Target
+from usdhand.reduce.settings import PRESETS, Criteria, Fit, Target
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "gestures"
 FITS: dict[str, tuple[Fit, int]] = {
@@ -74,7 +74,7 @@ def fitted(takes: Sequence[Take], target: Target, fit: str) -> ReducedRig:
 
 
 def best(
-    takes: Sequence[Take], count: int, most: int | None = None, choice: Choice | None = None
+    takes: Sequence[Take], count: int, most: int | None = None, choice: Criteria | None = None
 ) -> ReducedRig:
     """One rig of the best channels for all takes."""
     evidence = gather((t.clip, t.hands, t.source) for t in takes)
@@ -228,12 +228,12 @@ def print_alone(takes: Sequence[Take]) -> None:
     )
 
 
-def _for_one_degree(evidence: Evidence) -> tuple[int, int]:
+def _for_one_degree(evidence: Takes) -> tuple[int, int]:
     """Fewest free channels, and components of PCA, with 1 degree RMS."""
     variances = np.linalg.eigvalsh(evidence.moments.covariance)[::-1]
     left = np.sqrt(np.maximum(variances.sum() - np.cumsum([0.0, *variances]), 0.0) / 50)
     components = int(np.argmax(left <= 1.0))
-    search = subsets(evidence, Choice())
+    search = subsets(evidence, Criteria())
     for count in range(components, len(search.groups) + 1):
         residual = search.residual(search.best(count))
         if np.sqrt(np.diag(residual).mean()) <= 1.0:
@@ -269,7 +269,7 @@ def print_others(takes: Sequence[Take], others: Sequence[Path]) -> None:
     print("**The fingertips**, one rig for the same takes, 15 channels free. Mean mm.\n")
     rigs = {
         "best by deg": best(known, 15),
-        "best by mm": best(known, 15, None, Choice("mm")),
+        "best by mm": best(known, 15, None, Criteria("mm")),
         **{label: searched(known, 15, n) for label, n in SEARCHED.items()},
     }
     table(

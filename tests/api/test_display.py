@@ -83,6 +83,7 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         usdhand.SpliceSettings(pins=(usdhand.Pin(0.0, 0.0, name=LONG),) * 99),
         usdhand.Pin(0.0, 0.0, name=LONG),
         usdhand.ReduceSettings(preset=4),
+        usdhand.Variation(0.5, 3),
         usdhand.Edits(fps=24.0, trim=(1.0, 2.0)),
         usdhand.Reading(skel=LONG, animation=LONG),
         usdhand.PreviewSettings(max_points=0),

@@ -156,6 +156,32 @@ def cases(folder: Path) -> Iterator[Case]:
     yield Case(
         "expand", no_hand, "'Nobody' is not in the skeleton", lambda: usdhand.expand(rig, named)
     )
+    yield Case(
+        "expand_motion",
+        usage,
+        "lack the channel",
+        lambda: usdhand.expand_motion(reduction.rig, left),
+    )
+    yield Case(
+        "expand_motion",
+        no_hand,
+        "no hand found",
+        lambda: usdhand.expand_motion(reduction.rig, bare),
+    )
+    yield Case("fit_rig", no_input, "", lambda: usdhand.fit_rig([]))
+    yield Case("fit_rig", no_hand, "no hand found", lambda: usdhand.fit_rig([bare]))
+    yield Case(
+        "fit_rig",
+        usdhand.QualityError,
+        "",
+        lambda: usdhand.fit_rig([clip], usdhand.ReduceSettings(max_error=0.0)),
+    )
+    yield Case(
+        "fit_rig",
+        usage,
+        "",
+        lambda: usdhand.fit_rig([clip], usdhand.ReduceSettings(preset=4, max_error=1.0)),
+    )
     yield Case("expand_onto", no_input, "no such file", lambda: usdhand.expand_onto(rig, nothing))
     yield Case(
         "expand_onto",

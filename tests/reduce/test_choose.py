@@ -15,12 +15,12 @@ from usdhand.errors import QualityError, UsageError
 from usdhand.motion import Clip
 from usdhand.reduce.curve import Loss, error_curve
 from usdhand.reduce.errors import pca_rms
-from usdhand.reduce.evidence import MOST_FOLDS, Evidence, gather, tip_forms
+from usdhand.reduce.evidence import MOST_FOLDS, Takes, gather, tip_forms
 from usdhand.reduce.limits import MARGIN_DEG, Limits, anatomical_range
 from usdhand.reduce.method import apply_rig, fit_to
 from usdhand.reduce.moments import Moments
 from usdhand.reduce.rig import ReducedRig, Relation
-from usdhand.reduce.settings import Choice, ReduceSettings, Target
+from usdhand.reduce.settings import Criteria, ReduceSettings, Target
 
 RIG, INDEX = skeleton(axes=2)
 Taken = tuple[Clip, Hands, Channels]
@@ -46,7 +46,7 @@ TAKES = [take(seed) for seed in range(5)]
 
 
 def fitted(target: Target, takes: list[Taken] = TAKES, **choice: object) -> ReducedRig:
-    own = Choice(**choice)  # type: ignore[arg-type]
+    own = Criteria(**choice)  # type: ignore[arg-type]
     return fit_to(gather(takes), target, "least-squares", None, own)
 
 
@@ -266,7 +266,7 @@ def test_how_much_of_a_channel_is_told() -> None:
 
 def test_losses_are_roots_of_means() -> None:
     evidence = replace(gather(TAKES[:1]), tips=np.stack([np.eye(50), 3.0 * np.eye(50)]))
-    assert isinstance(evidence, Evidence)
+    assert isinstance(evidence, Takes)
     loss = Loss.of(4.0 * np.eye(50), evidence)
     assert loss.deg == pytest.approx(2.0)
     assert loss.mm == pytest.approx(np.sqrt(4.0 * 50 * 2.0))

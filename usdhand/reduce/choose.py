@@ -11,13 +11,13 @@ import numpy as np
 from usdhand.anatomy.channels import is_flexion
 from usdhand.errors import QualityError, UsageError
 from usdhand.motion.rotations import Array
-from usdhand.reduce.evidence import Evidence
+from usdhand.reduce.evidence import Takes
 from usdhand.reduce.fit import SMALLEST_RANGE_DEG
 from usdhand.reduce.limits import Limits
 from usdhand.reduce.moments import Moments
 from usdhand.reduce.relate import RIDGES, Shape, best_shape, left_out, residual_moments, told_by
 from usdhand.reduce.rig import Relation
-from usdhand.reduce.settings import Choice, Target
+from usdhand.reduce.settings import Criteria, Target
 from usdhand.reduce.subset import Subsets
 
 # Share of its variance that each channel of several takes is held to have of its own, when channels
@@ -37,7 +37,7 @@ class Model:
     told: Array
 
 
-def choose(evidence: Evidence, target: Target, controllers: int | None, choice: Choice) -> Model:
+def choose(evidence: Takes, target: Target, controllers: int | None, choice: Criteria) -> Model:
     """Channels for a number of them, or the fewest for a largest error.
 
     Raises
@@ -54,8 +54,8 @@ def choose(evidence: Evidence, target: Target, controllers: int | None, choice: 
 
 
 def subsets(
-    evidence: Evidence,
-    choice: Choice,
+    evidence: Takes,
+    choice: Criteria,
     largest: float | None = None,
     fitted: Moments | None = None,
 ) -> Subsets:
@@ -95,7 +95,7 @@ def subsets(
 
 
 def model_of(
-    evidence: Evidence, free: Sequence[int], controllers: int | None, choice: Choice
+    evidence: Takes, free: Sequence[int], controllers: int | None, choice: Criteria
 ) -> Model:
     """How all channels follow the free ones."""
     measure = evidence.measure(choice.measure)
@@ -103,7 +103,7 @@ def model_of(
     return Model(tuple(free), shape, told_by(evidence.moments, free, shape))
 
 
-def relations_of(evidence: Evidence, model: Model) -> tuple[Relation, ...]:
+def relations_of(evidence: Takes, model: Model) -> tuple[Relation, ...]:
     """The model as relations of a rig."""
     moments, names = evidence.moments, evidence.names
     std = moments.std
@@ -137,7 +137,7 @@ def relations_of(evidence: Evidence, model: Model) -> tuple[Relation, ...]:
     return tuple(relation(a) for a in range(len(names)))
 
 
-def _for_count(evidence: Evidence, count: int, controllers: int | None, choice: Choice) -> Model:
+def _for_count(evidence: Takes, count: int, controllers: int | None, choice: Criteria) -> Model:
     if count < 0:
         raise UsageError(f"{count} free channels are not possible: give 0 or more.")
     search = subsets(evidence, choice)
@@ -155,7 +155,7 @@ def _for_count(evidence: Evidence, count: int, controllers: int | None, choice: 
     return model_of(evidence, search.channels(free), controllers, choice)
 
 
-def _for_error(evidence: Evidence, most: float, controllers: int | None, choice: Choice) -> Model:
+def _for_error(evidence: Takes, most: float, controllers: int | None, choice: Criteria) -> Model:
     if not most > 0:
         raise QualityError(
             f"An RMS error of at most {most:g} degrees is not possible: give a number above 0."

@@ -9,12 +9,12 @@ import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.reduce.choose import subsets
-from usdhand.reduce.evidence import Evidence
+from usdhand.reduce.evidence import Takes
 from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.moments import Moments, pooled
 from usdhand.reduce.relate import Shape, residual_moments, told_by
 from usdhand.reduce.rig import ReducedRig, relation_matrix
-from usdhand.reduce.settings import PRESETS, Choice
+from usdhand.reduce.settings import PRESETS, Criteria
 
 # A ridge that serves takes left out about as well as the best one, whatever the count.
 RIDGE = 0.1
@@ -30,7 +30,7 @@ class Loss:
     mm: float
 
     @classmethod
-    def of(cls, missed: Array, evidence: Evidence) -> Loss:
+    def of(cls, missed: Array, evidence: Takes) -> Loss:
         """From second moments (n, n) of what is missed."""
         parts = (evidence.measure(name).parts(missed) for name in ("deg", "mm"))
         deg, mm = (float(np.sqrt(max(p.mean(), 0.0))) if len(p) else 0.0 for p in parts)
@@ -73,7 +73,7 @@ class ErrorCurve:
 
 
 def error_curve(
-    evidence: Evidence, choice: Choice | None = None, controllers: int | None = None
+    evidence: Takes, choice: Criteria | None = None, controllers: int | None = None
 ) -> ErrorCurve:
     """Errors of the best channels for some counts, by what ``choice`` says.
 
@@ -82,7 +82,7 @@ def error_curve(
     UsageError
         if a channel that is kept does not exist.
     """
-    choice = choice or Choice()
+    choice = choice or Criteria()
     folds = evidence.folds
     shape = Shape(controllers, RIDGE if len(folds) > 1 else Shape().ridge)
     fitted = _losses(evidence, evidence.moments, [evidence.moments], shape, choice)
@@ -104,7 +104,7 @@ def error_curve(
     return ErrorCurve(tuple(points), _presets(evidence), _knee(points, choice.measure))
 
 
-def rig_loss(rig: ReducedRig, evidence: Evidence) -> Loss:
+def rig_loss(rig: ReducedRig, evidence: Takes) -> Loss:
     """What a rig's relations lose on the motion that it was fitted to, limits apart."""
     moments = evidence.moments
     missed = residual_moments(relation_matrix(rig.relations), moments, moments)
@@ -112,7 +112,11 @@ def rig_loss(rig: ReducedRig, evidence: Evidence) -> Loss:
 
 
 def _losses(
-    evidence: Evidence, fitted: Moments, shown: Sequence[Moments], shape: Shape, choice: Choice
+    evidence: Takes,
+    fitted: Moments,
+    shown: Sequence[Moments],
+    shape: Shape,
+    choice: Criteria,
 ) -> dict[int, tuple[Loss, Loss]]:
     """Loss of the best channels, and of PCA, on what is shown, by count."""
     search = subsets(evidence, choice, fitted=fitted)
@@ -143,7 +147,7 @@ def _together(weights: Array, losses: Sequence[Loss]) -> Loss | None:
     return Loss(deg, mm)
 
 
-def _presets(evidence: Evidence) -> dict[int, tuple[int, Loss]]:
+def _presets(evidence: Takes) -> dict[int, tuple[int, Loss]]:
     statistics = Statistics.from_moments(evidence.moments)
     found = {}
     for preset, thresholds in PRESETS.items():

@@ -33,7 +33,7 @@ TIP_STEP_DEG = 0.5
     }
 )
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class Takes:
     """Takes as a fit needs them.
 
     Attributes
@@ -63,7 +63,7 @@ class Evidence:
         return Measure("mm", self.tips) if name == "mm" else Measure("deg")
 
 
-def gather(takes: Iterable[tuple[Clip, Hands, Channels]]) -> Evidence:
+def gather(takes: Iterable[tuple[Clip, Hands, Channels]]) -> Takes:
     """Take in clips, with their hands and all their channels, one at a time.
 
     Angles of takes that differ by whole turns are brought onto one turn.
@@ -108,7 +108,7 @@ def gather(takes: Iterable[tuple[Clip, Hands, Channels]]) -> Evidence:
     if not folds:
         raise InputError("There is no clip to fit a rig to.")
     angles = {name: float(mean) for name, mean in zip(held, means, strict=True)}
-    return Evidence(names, tuple(folds), angles, tips, bands, tuple(sources))
+    return Takes(names, tuple(folds), angles, tips, bands, tuple(sources))
 
 
 def tip_forms(clip: Clip, hands: Hands, source: Channels) -> Array:

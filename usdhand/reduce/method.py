@@ -11,13 +11,13 @@ from usdhand.errors import UsageError
 from usdhand.motion import Clip
 from usdhand.reduce.choose import choose, relations_of
 from usdhand.reduce.errors import Errors, distances_mm, measure_errors
-from usdhand.reduce.evidence import Evidence, gather
+from usdhand.reduce.evidence import Takes, gather
 from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.limits import Limits
 from usdhand.reduce.moments import Moments
 from usdhand.reduce.rig import ReducedRig, Relation, relation_matrix
 from usdhand.reduce.search import thresholds_for_count, thresholds_for_error
-from usdhand.reduce.settings import Choice, Fit, Target, Thresholds
+from usdhand.reduce.settings import Criteria, Fit, Target, Thresholds
 from usdhand.reduce.variation import Residuals, Variation
 
 
@@ -55,7 +55,7 @@ class Reduction:
     errors: Errors
     model_errors: Errors
     total_errors: Errors
-    evidence: Evidence | None = None
+    evidence: Takes | None = None
 
     @property
     def motion(self) -> Clip:
@@ -70,7 +70,7 @@ def fit_rig(
     fit: Fit = "paper",
     most_controllers: int | None = None,
     sources: Sequence[Channels] | None = None,
-    choice: Choice | None = None,
+    choice: Criteria | None = None,
 ) -> ReducedRig:
     """Fit one rig to all clips together; see `fit_to`.
 
@@ -93,11 +93,11 @@ def fit_rig(
 
 
 def fit_to(
-    evidence: Evidence,
+    evidence: Takes,
     target: Target,
     fit: Fit = "paper",
     most_controllers: int | None = None,
-    choice: Choice | None = None,
+    choice: Criteria | None = None,
 ) -> ReducedRig:
     """Fit a rig: by the rules of Joerg & O'Sullivan 2009, or with the best channels.
 
@@ -117,7 +117,7 @@ def fit_to(
     """
     if (most_controllers or 1) > 1 and fit == "paper":
         raise UsageError("Several controllers per channel need the least-squares fit.")
-    names, moments, choice = evidence.names, evidence.moments, choice or Choice()
+    names, moments, choice = evidence.names, evidence.moments, choice or Criteria()
     thresholds, measure = Thresholds(0.0, 0.0), ""
     if target.thresholds is None and fit == "least-squares":
         model = choose(evidence, target, most_controllers, choice)

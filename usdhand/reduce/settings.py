@@ -46,7 +46,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Criteria:
     """What counts where the free channels are chosen directly, as the best ones.
 
     Attributes
@@ -81,7 +81,7 @@ class ReduceSettings:
         paper's for thresholds, least squares for a number of channels or a largest error
     controllers : how many channels a channel may follow, with least squares; by default one for
         thresholds, else as many as serve takes left out
-    measure, keep, prefer, symmetric : see `Choice`
+    measure, keep, prefer, symmetric : see `Criteria`
     """
 
     preset: int | None = option(
@@ -139,9 +139,9 @@ class ReduceSettings:
         check_choices(self)
 
     @property
-    def choice(self) -> Choice:
+    def choice(self) -> Criteria:
         """What counts where the free channels are chosen directly."""
-        return Choice(self.measure, self.keep, self.prefer, self.symmetric)
+        return Criteria(self.measure, self.keep, self.prefer, self.symmetric)
 
     @property
     def target(self) -> Target:
@@ -172,7 +172,7 @@ class ReduceSettings:
             thresholds = PRESETS[4]
         target = Target(thresholds, self.free_channels, self.max_error)
         by_rules = thresholds is not None or self.fit == "paper"
-        if by_rules and self.choice != Choice():
+        if by_rules and self.choice != Criteria():
             raise UsageError(
                 "--measure, --keep, --prefer and --symmetric are for the channels that "
                 "--target-dofs and --max-error choose by least squares; the paper's rules have no "

@@ -10,7 +10,7 @@ import numpy as np
 from usdhand.anatomy.hand import DIGITS
 from usdhand.reduce.curve import Loss, error_curve
 from usdhand.reduce.errors import Errors, pca_rms
-from usdhand.reduce.evidence import Evidence
+from usdhand.reduce.evidence import Takes
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.rig import ReducedRig, Relation
 from usdhand.reduce.settings import ReduceSettings
@@ -57,7 +57,7 @@ def reduce_result(reduction: Reduction) -> dict[str, Any]:
     }
 
 
-def fit_result(rig: ReducedRig, evidence: Evidence) -> dict[str, Any]:
+def fit_result(rig: ReducedRig, evidence: Takes) -> dict[str, Any]:
     """Everything `reduce --fit-only` reports but the curve."""
     moments = evidence.moments
     return {
@@ -138,7 +138,7 @@ def channel_in_words(channel: str) -> str:
     return f"{side} {digit.lower()} {joint.removeprefix(digit)} {motion}"
 
 
-def curve_data(evidence: Evidence, settings: ReduceSettings) -> dict[str, Any]:
+def curve_data(evidence: Takes, settings: ReduceSettings) -> dict[str, Any]:
     """Errors by number of channels, PCA's beside them, and the number at the knee."""
     curve = error_curve(evidence, settings.choice, settings.controllers)
 

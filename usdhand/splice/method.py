@@ -26,7 +26,7 @@ from usdhand.splice.quality import Phase, phase_qualities
 from usdhand.splice.reach import Contradiction
 from usdhand.splice.refine import MarkerPair
 from usdhand.splice.settings import Pin, SpliceSettings
-from usdhand.splice.timing import Timing, align_hands, check_trunks, hands_steps
+from usdhand.splice.timing import HandTiming, align_hands, check_trunks, hands_steps
 from usdhand.splice.warps import through_pins
 
 # A hand whose wrist stays within this of its mean, in lengths of the palm, does not move; and one
@@ -295,7 +295,7 @@ def _alignment(
     settings: SpliceSettings,
     pins: tuple[Pin, ...],
     times: Array,
-    timing: Timing,
+    timing: HandTiming,
 ) -> Alignment:
     warp = np.interp(np.arange(len(ours)) / ours.fps, times, timing.warp)
     return Alignment(

@@ -56,7 +56,7 @@ def is_local(warp: Array, times: Array, pins: Sequence[Pin]) -> bool:
 def bounded(
     pair: MarkerPair, free: Array, pinned: Array, times: Array, pins: Sequence[Pin], align: Align
 ) -> Array:
-    """Timing through pins (times,) that is the free one away from them, unless motion agrees.
+    """HandTiming through pins (times,) that is the free one away from them, unless motion agrees.
 
     Where a pin is as the timing without pins was, nothing on its other side has to move.
 

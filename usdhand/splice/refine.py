@@ -173,7 +173,7 @@ def evidence(
 
 
 @dataclass(frozen=True, eq=False)
-class _Band:
+class _Scale:
     """Curves of both hands in one band.
 
     ``independent`` samples of noise a frame, the ``share`` of white noise's squares that is in the
@@ -187,10 +187,10 @@ class _Band:
     alike_s: float
 
 
-def _bands(ours: Array, theirs: Array, borders: Sequence[float], fps: float) -> list[_Band]:
+def _bands(ours: Array, theirs: Array, borders: Sequence[float], fps: float) -> list[_Scale]:
     """Curves split into bands; one band if they differ by white noise anyway."""
     rate = 1.0 / borders[0]
-    whole = _Band(ours, theirs, rate / (2.0 * np.sqrt(np.pi) * fps), 1.0, NOISE_S)
+    whole = _Scale(ours, theirs, rate / (2.0 * np.sqrt(np.pi) * fps), 1.0, NOISE_S)
     if len(borders) == 1:
         return [whole]
     lows = [[_smoother(c, borders[0], b, fps) for b in borders] for c in (ours, theirs)]
@@ -201,7 +201,7 @@ def _bands(ours: Array, theirs: Array, borders: Sequence[float], fps: float) -> 
         levels.append(float(np.median(_dot(a - b, a - b))) / rate)
         share = max(rate * borders[0], LEAST_SHARE)
         independent = rate / (2.0 * np.sqrt(np.pi) * fps)
-        found.append(_Band(a, b, independent, share, max(NOISE_S, coarse)))
+        found.append(_Scale(a, b, independent, share, max(NOISE_S, coarse)))
     return [whole] if levels[-1] < WHITE_FACTOR * levels[0] else found
 
 

@@ -38,7 +38,7 @@ MOST_LAG_S = 0.006
 
 
 @dataclass(frozen=True, eq=False)
-class Timing:
+class HandTiming:
     """What both passes found for one hand.
 
     Attributes
@@ -72,7 +72,7 @@ def align(
     pins: Sequence[Pin],
     times: Array,
     steps: Steps | None = None,
-) -> tuple[Timing, ...]:
+) -> tuple[HandTiming, ...]:
     """One timing of all hands, refined for each: markers of body and hand clip of every hand.
 
     It takes `STEPS` steps.
@@ -104,7 +104,7 @@ def align(
     phase_warp = _in_time(first, hand, times, pins)
     if settings.tether == 0:
         steps.add()
-        return (Timing(phase_warp, phase_warp, cost, first, first, first, shared),) * len(pairs)
+        return (HandTiming(phase_warp, phase_warp, cost, first, first, first, shared),) * len(pairs)
     tether = settings.tether * hand.fps
     first = through_pins(first / hand.fps, own_times, pins) * hand.fps
     freedom = np.minimum(freedom * hand.fps, reach)
@@ -114,7 +114,7 @@ def align(
         rows = [refined([p], second, freedom, settings.align, tether, OWN_STAGES) for p in pairs]
     steps.add()
     return tuple(
-        Timing(_in_time(r, hand, times, pins), phase_warp, cost, r, first, second, shared)
+        HandTiming(_in_time(r, hand, times, pins), phase_warp, cost, r, first, second, shared)
         for r in rows
     )
 
@@ -125,7 +125,7 @@ def align_hands(
     pins: Sequence[Pin],
     times: Array,
     steps: Steps | None = None,
-) -> tuple[Timing, ...]:
+) -> tuple[HandTiming, ...]:
     """Timings of all hands: one for all, unless one of them agrees better on its own.
 
     Pins that only correct the timing without them act near them, unless motion agrees with more.
@@ -162,7 +162,7 @@ def _suiting(
     pins: Sequence[Pin],
     times: Array,
     steps: Steps,
-) -> tuple[Timing, ...]:
+) -> tuple[HandTiming, ...]:
     """Timings of all hands, one for all where it suits all."""
     alone = tuple(align([p], settings, pins, times, steps)[0] for p in pairs)
     if len(pairs) == 1:
@@ -175,11 +175,11 @@ def _suiting(
 
 def _trusted(
     pairs: Sequence[MarkerPair],
-    found: Sequence[Timing],
+    found: Sequence[HandTiming],
     settings: SpliceSettings,
     times: Array,
     pins: Sequence[Pin],
-) -> tuple[Timing, ...]:
+) -> tuple[HandTiming, ...]:
     """Timings that are those of pass 1 where pass 2 does not hold."""
     if settings.tether == 0:
         return tuple(found)
@@ -202,8 +202,8 @@ def _trusted(
 
 def _in_step(
     pairs: Sequence[MarkerPair],
-    alone: Sequence[Timing],
-    together: Sequence[Timing],
+    alone: Sequence[HandTiming],
+    together: Sequence[HandTiming],
     settings: SpliceSettings,
 ) -> bool:
     """Whether one timing suits all hands."""

@@ -16,6 +16,7 @@ from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.formats.usd.rig import StoredRig
+from usdhand.formats.usd.rig_frames import with_stored_frames
 from usdhand.motion import Clip
 from usdhand.motion.resample import resample_like
 from usdhand.problems import Problem, listed
@@ -221,7 +222,7 @@ def _expanded(
     refresh: bool,
     variation: Variation | None,
 ) -> Clip:
-    hands = usd_rig.with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
+    hands = with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
     if refresh:
         return _refreshed(stored, conventions, variation)
     motion = expand_channels(stored.rig, stored.free, stored.clip, hands, variation)
@@ -245,7 +246,7 @@ def _refreshed(
             "is nothing to refresh the body from. Give that clip: --onto CLIP"
         )
     body = resample_like(read_any(source.path, source.skeleton)[0], stored.clip)
-    hands = usd_rig.with_stored_frames(find_hands(body, conventions), stored.frames)
+    hands = with_stored_frames(find_hands(body, conventions), stored.frames)
     return expand_channels(stored.rig, stored.free, body, hands, variation)
 
 

@@ -20,10 +20,10 @@ from usdhand.formats.usd import rig as usd_rig
 from usdhand.formats.usd.rig_library import write_fitted_rig
 from usdhand.motion import Clip, Skeleton
 from usdhand.problems import Problem
-from usdhand.reduce.evidence import Evidence, gather
+from usdhand.reduce.evidence import Takes, gather
 from usdhand.reduce.method import Reduction, apply_rig, fit_to
 from usdhand.reduce.rig import ReducedRig
-from usdhand.reduce.settings import Choice, ReduceSettings
+from usdhand.reduce.settings import Criteria, ReduceSettings
 from usdhand.report.plots import curve
 from usdhand.report.plots import reducing as plotting
 from usdhand.report.plots.style import check_plots
@@ -82,7 +82,7 @@ def reduce_hands(
     return [replace(apply_rig(rig, clip, h, source), evidence=evidence) for clip, h, source in each]
 
 
-def fit_evidence(evidence: Evidence, settings: ReduceSettings) -> ReducedRig:
+def fit_evidence(evidence: Takes, settings: ReduceSettings) -> ReducedRig:
     """Fit a rig as settings say."""
     by_rules = settings.target.thresholds is not None
     fit = settings.fit or ("paper" if by_rules else "least-squares")
@@ -312,7 +312,7 @@ def _check_fitting(request: ReduceRequest) -> None:
         raise UsageError(f"--rig applies a rig as it is; {used[0]} fits one.")
     if request.rig is not None and (given.fit is not None or given.controllers is not None):
         raise UsageError("--rig applies a rig as it is; --fit and --controllers are for fitting.")
-    if request.rig is not None and given.choice != Choice():
+    if request.rig is not None and given.choice != Criteria():
         raise UsageError(
             "--rig applies a rig as it is; --measure, --keep, --prefer and --symmetric are for "
             "fitting."

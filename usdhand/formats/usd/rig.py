@@ -10,14 +10,14 @@ from typing import Any, cast, get_args
 import numpy as np
 from pxr import Sdf, Usd, UsdSkel, Vt
 
-from usdhand.anatomy.channels import Channels, Hands
-from usdhand.anatomy.frames import HandFrames
+from usdhand.anatomy.channels import Channels
 from usdhand.anatomy.hand import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.damage import damage_refused, refuses_damage
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, LIMITS, VERSION, author_rig
+from usdhand.formats.usd.rig_frames import StoredFrames
 from usdhand.formats.usd.rig_residuals import read_residuals
 from usdhand.formats.usd.rig_source import RigSource, rig_source
 from usdhand.formats.usd.stage import (
@@ -57,23 +57,6 @@ class StoredRig:
     clip: Clip
     frames: Mapping[Side, StoredFrames]
     source: RigSource | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class StoredFrames:
-    """Anatomical frames as the rig has them: hand joints and quaternions (n, 4)."""
-
-    names: tuple[str, ...]
-    reference_frames: Array
-    joint_frames: Array
-
-    def on(self, frames: HandFrames) -> HandFrames:
-        """Return these frames on a hand with the same joints, else the hand's own."""
-        if self.names != frames.names:
-            return frames
-        return replace(
-            frames, reference_frames=self.reference_frames, joint_frames=self.joint_frames
-        )
 
 
 def write_rig(
@@ -403,10 +386,3 @@ def _stored_frames(prim: Usd.Prim, path: Path) -> dict[Side, StoredFrames]:
             raise InputError(f"{path}: the rig has {side} hand joints that do not exist.")
         found[side] = StoredFrames(names, frames[0], frames[1])
     return found
-
-
-def with_stored_frames(hands: Hands, stored: Mapping[Side, StoredFrames]) -> Hands:
-    """Return hands with the frames that a rig was fitted with."""
-    return replace(
-        hands, frames={s: stored[s].on(f) if s in stored else f for s, f in hands.frames.items()}
-    )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from usdhand.reduce.curve import CurvePoint, ErrorCurve, Loss, error_curve, rig_loss
-from usdhand.reduce.evidence import Evidence
+from usdhand.reduce.evidence import Takes
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.settings import ReduceSettings
 from usdhand.report.plots import style
@@ -22,14 +22,14 @@ NAMES = ("reduce_errors",)
 UNITS = {"deg": "RMS error over all channels, deg", "mm": "RMS error of the fingertips, mm"}
 
 
-def figures(rig: ReducedRig, evidence: Evidence, settings: ReduceSettings) -> dict[str, Figure]:
+def figures(rig: ReducedRig, evidence: Takes, settings: ReduceSettings) -> dict[str, Figure]:
     """The plot of a fit by name."""
     curve = error_curve(evidence, settings.choice, settings.controllers)
     return {"reduce_errors": draw(rig, evidence, curve)}
 
 
 @styled
-def draw(rig: ReducedRig, evidence: Evidence, curve: ErrorCurve) -> Figure:
+def draw(rig: ReducedRig, evidence: Takes, curve: ErrorCurve) -> Figure:
     """Two panels: degrees and millimetres."""
     figure, panels = style.new_figure(
         "What the best channels lose, by how many stay free", (9.5, 4.0), 1, 2
