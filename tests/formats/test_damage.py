@@ -264,9 +264,10 @@ def test_files_from_outside_are_packed_only_if_that_is_allowed(tmp_path: Path) -
 def test_compressed_files_in_packages_are_refused(tmp_path: Path) -> None:
     """USD refuses layers; textures could be of any size."""
     (tmp_path / "skin.png").write_bytes(b"skin" * 1000)
-    whole, odd = tmp_path / "whole.usdz", tmp_path / "odd.usdz"
+    whole = tmp_path / "whole.usdz"
     run("convert", textured(tmp_path, "skin.png"), "-o", whole)
     for packed, code in ((".png", 3), (".usdc", 3), (".none", 0)):
+        odd = tmp_path / f"odd{packed}.usdz"  # USD maps files: one that is open is not rewritten
         with zipfile.ZipFile(whole) as source, zipfile.ZipFile(odd, "w") as target:
             for info in source.infolist():
                 stored = not info.filename.endswith(packed)
