@@ -7,6 +7,8 @@ import copy
 import json
 import resource
 import struct
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -152,11 +154,19 @@ def fuzz(count: int, seed: int, tmp_path: Path) -> None:
     assert 0.02 * count < read < 0.9 * count
 
 
+def fuzz_apart(count: int, seed: int, folder: Path) -> None:
+    """In a process of its own: the memory is that of reading, not of the tests before."""
+    start = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import fuzz; "
+    call = f"from pathlib import Path; fuzz({count}, {seed}, Path({str(folder)!r}))"
+    done = subprocess.run([sys.executable, "-c", start + call], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_any_damage(tmp_path: Path) -> None:
-    fuzz(700, 1, tmp_path)
+    fuzz_apart(700, 1, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2, 8))
 def test_much_damage(seed: int, tmp_path: Path) -> None:
-    fuzz(8_000, seed, tmp_path)
+    fuzz_apart(8_000, seed, tmp_path)
