@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from usdhand.display import displayed
+from usdhand.problems import Problem
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = ("left", "right")
@@ -100,6 +101,11 @@ class CharacterMap:
     notes: tuple[str, ...] = ()
     contradictions: tuple[str, ...] = ()
     evidence: tuple[str, ...] = ()
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """Warnings of the contradictions."""
+        return tuple(Problem("misleading-name", message) for message in self.contradictions)
 
     def corrected(self, *contradictions: str) -> CharacterMap:
         """The map with more notes on names that the bind pose contradicts."""

@@ -73,10 +73,7 @@ def read_any(
     """
     path, reading = Path(path), _with_skel(reading, skel)
     if is_usd(path):
-        character = find_character(path, _usd_skel(path, reading))
-        if character.animation is None:
-            return usd.bind_pose_clip(character), False
-        return usd.clip_from_character(character), True
+        return usd.motion_or_pose(find_character(path, _usd_skel(path, reading)))
     animated = bool(_reader(path).animation_names(path))
     return (read_clip if animated else read_character)(path, None, reading), animated
 

@@ -9,7 +9,6 @@ from usdhand.anatomy import Hands
 from usdhand.anatomy.channels import is_flexion
 from usdhand.anatomy.hand import CharacterMap, HandMap
 from usdhand.motion import Clip
-from usdhand.problems import Problem
 from usdhand.reduce.rig import ReducedRig
 from usdhand.report.document import rounded
 from usdhand.report.reduce import relation_lines, relations_data
@@ -38,10 +37,7 @@ def inspect_result(clip: Clip, hands: Hands | None, animated: bool = True) -> di
             result["channels"] = _channel_ranges(clip, hands)
             result["off_axis_share"] = _off_axis_shares(clip, hands)
         result["notes"] = list(hands.notes)
-        against = [
-            Problem("misleading-name", message) for message in hands.character.contradictions
-        ]
-        result["problems"] += problems_data(against)
+        result["problems"] += problems_data(hands.character.problems)
     return result
 
 

@@ -29,13 +29,7 @@ def reduce_result(reduction: Reduction) -> dict[str, Any]:
         "clip": reduction.clip.name,
         "free_channels": len(rig.free),
         "total_channels": len(rig.names),
-        "thresholds": {
-            "range_deg": rounded(rig.range_threshold),
-            "rmsd": rounded(rig.rmsd_threshold),
-        },
-        "fit": rig.fit,
-        "measure": rig.measure or None,
-        "fitted_to": list(rig.sources),
+        **_fit_data(rig),
         "channels": _channels_data(rig, errors, curves),
         "followed_to_root_over_threshold": over,
         "rms_error_deg": rounded(errors.rms_deg),
@@ -64,6 +58,16 @@ def fit_result(rig: ReducedRig, evidence: Takes) -> dict[str, Any]:
         "free_channels": len(rig.free),
         "total_channels": len(rig.names),
         "frames": moments.frames,
+        **_fit_data(rig),
+        "relations": relations_data(rig),
+        "followed_to_root_over_threshold": followed_over(rig),
+        "held_channels": {name: rounded(value) for name, value in rig.held.items()},
+    }
+
+
+def _fit_data(rig: ReducedRig) -> dict[str, Any]:
+    """How a rig was fitted, and to what."""
+    return {
         "thresholds": {
             "range_deg": rounded(rig.range_threshold),
             "rmsd": rounded(rig.rmsd_threshold),
@@ -71,9 +75,6 @@ def fit_result(rig: ReducedRig, evidence: Takes) -> dict[str, Any]:
         "fit": rig.fit,
         "measure": rig.measure or None,
         "fitted_to": list(rig.sources),
-        "relations": relations_data(rig),
-        "followed_to_root_over_threshold": followed_over(rig),
-        "held_channels": {name: rounded(value) for name, value in rig.held.items()},
     }
 
 

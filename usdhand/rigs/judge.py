@@ -106,8 +106,7 @@ def _in_order(hand: HandMap, shape: FoundHand) -> tuple[FoundHand, dict[str, str
     fingers = [d for d in FINGERS if d in named]
     owners = [named[d] for d in fingers]
     if "Thumb" not in owners and named.get("Thumb", "Thumb") == "Thumb" and _rising(owners):
-        label = named if len(fingers) < len(FINGERS) else dict(zip(FINGERS, FINGERS, strict=True))
-        return _labelled(shape, {"Thumb": "Thumb"} | label), {}
+        return _labelled(shape, {"Thumb": "Thumb"} | named), {}
     present = sorted(set(named.values()) - {"Thumb"}, key=FINGERS.index)
     rest = present if len(present) == len(fingers) else FINGERS
     label = {"Thumb": "Thumb"} | dict(zip(fingers, rest, strict=False))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from usdhand.anatomy import SIDES, Hands, Side
@@ -54,13 +55,10 @@ def find_hands(
 def misleading_names(clip: Clip, conventions: Conventions | None = None) -> tuple[Problem, ...]:
     """Warnings where the bind pose contradicts joint names; none without hands."""
     try:
-        character = map_character(clip.skeleton, conventions)
+        found = map_character(clip.skeleton, conventions).problems
     except HandNotFoundError:
         return ()
-    file = str(clip.origin.path or "")
-    return tuple(
-        Problem("misleading-name", message, file=file) for message in character.contradictions
-    )
+    return tuple(replace(problem, file=str(clip.origin.path or "")) for problem in found)
 
 
 def write_clip(

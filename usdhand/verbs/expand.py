@@ -94,8 +94,8 @@ def expand_onto(
         if the target has no hands.
     """
     stored, chosen = _chosen(path, skel, rig_skel)
-    target = target if isinstance(target, Clip) else _target(target, skel, chosen)
-    return _onto(stored.rig, stored.free, stored.clip, target, skel, conventions, variation)
+    body = _target(target, skel, chosen)
+    return _onto(stored.rig, stored.free, stored.clip, body, conventions, variation)
 
 
 def expand_motion(
@@ -122,9 +122,7 @@ def expand_motion(
         if a clip has no hands.
     """
     free, own = _free_channels(rig, motion, conventions)
-    if target is None:
-        return expand_channels(rig, free, motion, own, variation)
-    return _onto(rig, free, motion, target, skel, conventions, variation)
+    return _made_of(rig, free, motion, own, target, skel, conventions, variation)
 
 
 def run(request: ExpandRequest, journal: Journal) -> Outcome:
@@ -168,8 +166,9 @@ def _baked(
             raise UsageError("--refresh has no effect with --motion: leave one of them out.")
         rig = usd_rig.read_rig(request.rig, request.rig_skel)
         clip = read_clip(request.motion, skel if onto is None else None)
-        journal.about(request.motion, _doubts(rig, clip, conventions), "warning")
-        return rig, expand_motion(rig, clip, onto, skel, conventions, variation=variation)
+        free, own = _free_channels(rig, clip, conventions)
+        journal.about(request.motion, _doubts(rig, free), "warning")
+        return rig, _made_of(rig, free, clip, own, onto, skel, conventions, variation)
     if onto is None:
         if request.rig_skel is not None:
             raise UsageError("--rig-skel is for --onto; without it, --skel chooses the rig.")
@@ -178,8 +177,9 @@ def _baked(
     if request.refresh:
         raise UsageError("--refresh has no effect with --onto: leave one of them out.")
     stored, chosen = _chosen(request.rig, skel, request.rig_skel)
-    rig, free, clip = stored.rig, stored.free, stored.clip
-    return rig, _onto(rig, free, clip, _target(onto, skel, chosen), skel, conventions, variation)
+    body = _target(onto, skel, chosen)
+    motion = _onto(stored.rig, stored.free, stored.clip, body, conventions, variation)
+    return stored.rig, motion
 
 
 def _free_channels(
@@ -189,9 +189,24 @@ def _free_channels(
     return free_of(rig, clip, hands.encode(clip)), hands
 
 
-def _doubts(rig: ReducedRig, clip: Clip, conventions: Conventions | None) -> Iterator[Problem]:
+def _made_of(
+    rig: ReducedRig,
+    free: Channels,
+    clip: Clip,
+    own: Hands,
+    target: Clip | str | Path | None,
+    skel: str | None,
+    conventions: Conventions | None,
+    variation: Variation | None,
+) -> Clip:
+    """Motion from the free channels of a clip, on its own hands or on those of a target."""
+    if target is None:
+        return expand_channels(rig, free, clip, own, variation)
+    return _onto(rig, free, clip, _target(target, skel), conventions, variation)
+
+
+def _doubts(rig: ReducedRig, free: Channels) -> Iterator[Problem]:
     """What speaks against taking a clip's free channels at their word."""
-    free, _ = _free_channels(rig, clip, conventions)
     curves = dict(zip(free.names, free.values.T, strict=True))
     still = [name for name, curve in curves.items() if np.ptp(curve) < STILL_DEG]
     if still:
@@ -222,9 +237,9 @@ def _expanded(
     refresh: bool,
     variation: Variation | None,
 ) -> Clip:
-    hands = with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
     if refresh:
         return _refreshed(stored, conventions, variation)
+    hands = with_stored_frames(find_hands(stored.clip, conventions), stored.frames)
     motion = expand_channels(stored.rig, stored.free, stored.clip, hands, variation)
     joints = stored.clip.skeleton.joints
     moved = {joints[j] for frames in hands.frames.values() for j in frames.links.moving}
@@ -260,18 +275,19 @@ def _onto(
     rig: ReducedRig,
     free: Channels,
     clip: Clip,
-    target: Clip | str | Path,
-    skel: str | None,
+    body: Clip,
     conventions: Conventions | None,
     variation: Variation | None,
 ) -> Clip:
-    """Put the hands on the target, in the time of the clip that the free channels are of."""
-    body = target if isinstance(target, Clip) else read_any(target, skel)[0]
+    """Put the hands on a body, in the time of the clip that the free channels are of."""
     body = resample_like(body, clip)
     return expand_channels(rig, free, body, find_hands(body, conventions), variation)
 
 
-def _target(target: str | Path, skel: str | None, of_rig: bool) -> Clip:
+def _target(target: Clip | str | Path, skel: str | None, of_rig: bool = False) -> Clip:
+    """The target as a clip; ``skel`` that chose the rig need not be one of its skeletons."""
+    if isinstance(target, Clip):
+        return target
     try:
         return read_any(target, skel)[0]
     except UsageError:

@@ -9,7 +9,8 @@ from typing import Any
 from usdhand.errors import HandNotFoundError, UsageError, UsdHandError
 from usdhand.formats.files import animation_names, read_any, read_character
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.formats.usd.rig_library import rig_in
+from usdhand.formats.usd.read import motion_or_pose
+from usdhand.formats.usd.rig_library import read_with_rig
 from usdhand.reduce.rig import ReducedRig
 from usdhand.report.inspect import inspect_result, rig_result, summary
 from usdhand.report.plots import rigs
@@ -61,16 +62,20 @@ def run(request: InspectRequest, journal: Journal) -> Outcome:
 def _inspect(
     path: Path, skel: str | None, conventions: Conventions | None
 ) -> tuple[dict[str, Any], ReducedRig | None]:
-    found = rig_in(path, skel) if path.suffix.lower() in USD_SUFFIXES else None
-    rig, bound = found or (None, True)
-    shown = {"rig": rig_result(rig)} if rig else {}
-    if not bound:  # fitted without a character
-        return shown, rig
-    names = animation_names(path)
-    clip, animated = read_any(path, skel) if len(names) < 2 else (read_character(path, skel), False)
-    more = {"animations": list(names)} if len(names) > 1 else {}
+    rig, more = None, dict[str, Any]()
+    if path.suffix.lower() in USD_SUFFIXES:
+        rig, character = read_with_rig(path, skel)
+        if rig is not None:
+            more = {"rig": rig_result(rig)}
+        if character is None:
+            return more, rig
+        clip, animated = motion_or_pose(character)
+    elif len(names := animation_names(path)) > 1:
+        clip, animated = read_character(path, skel), False
+        more = {"animations": list(names)}
+    else:
+        clip, animated = read_any(path, skel)
     try:
-        return inspect_result(clip, find_hands(clip, conventions), animated) | more | shown, rig
+        return inspect_result(clip, find_hands(clip, conventions), animated) | more, rig
     except HandNotFoundError as error:
-        own = inspect_result(clip, None, animated) | more
-        return own | {"hand_error": str(error)} | shown, rig
+        return inspect_result(clip, None, animated) | more | {"hand_error": str(error)}, rig

@@ -22,6 +22,8 @@ def is_wide(data: bytes) -> bool:
 
 def encoding_of(data: bytes) -> tuple[str, tuple[Problem, ...]]:
     """Encoding of the names in a hierarchy, and a warning where it had to be guessed."""
+    if data.isascii():
+        return "utf-8", ()
     names = [m[1].strip() for m in _NAMES.finditer(data)]
     text = b" ".join(name for name in names if not name.isascii())
     try:

@@ -33,7 +33,7 @@ from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.damage import damage_refused, refuses_damage, usd_diagnostics
 from usdhand.formats.usd.stage import Character, compose, open_stage
-from usdhand.formats.usd.write import save_layer
+from usdhand.formats.usd.write import describe_layer, save_layer
 from usdhand.motion import Clip
 from usdhand.problems import Problem
 
@@ -57,9 +57,7 @@ def write_library(library: MotionLibrary, output: str | Path, *, force: bool = F
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     with Sdf.ChangeBlock():
         root = _prim(layer, ROOT, "Scope")
-        layer.defaultPrim = root.name
-        layer.pseudoRoot.SetInfo("upAxis", "Y")
-        layer.pseudoRoot.SetInfo("metersPerUnit", 0.01)
+        describe_layer(layer, root.name)
         _set_time(layer, library)
         segmentation = library.segmentation
         _set_all(

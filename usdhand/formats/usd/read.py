@@ -77,6 +77,13 @@ def clip_from_character(character: Character) -> Clip:
     return _checked(_animated_clip, character)
 
 
+def motion_or_pose(character: Character) -> tuple[Clip, bool]:
+    """A character's motion, or its bind pose where it has none; and whether it moves."""
+    if character.animation is None:
+        return bind_pose_clip(character), False
+    return clip_from_character(character), True
+
+
 @refuses_damage
 def bind_pose_clip(character: Character) -> Clip:
     """Return one frame of a character at its bind pose, whether it is animated or not."""

@@ -115,7 +115,7 @@ def read_rig(path: str | Path, skel: str | None = None) -> ReducedRig:
 def read_rig_on(stage: Usd.Stage, path: Path, skel: str | None = None) -> ReducedRig:
     """Read the relations of a rig on a stage that was opened from ``path``; see `read_rig`."""
     with damage_refused(path):
-        return _relations(find_rig(stage, path, skel), path)
+        return read_rig_at(find_rig(stage, path, skel), path)
 
 
 @refuses_damage
@@ -127,7 +127,7 @@ def read_stored_rig(path: str | Path, skel: str | None = None, option: str = "--
     path = Path(path)
     stage, problems = open_stage(path)
     prim = find_rig(stage, path, skel, option)
-    rig = _relations(prim, path)
+    rig = read_rig_at(prim, path)
     found = _skeleton_path(prim)
     if found is None and not prim.GetRelationship("usdhand:skeleton"):
         raise InputError(
@@ -200,7 +200,7 @@ def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Problem]:
             yield Problem("second-rig", message, where, "error")
         seen[skeleton] = where
         try:
-            rig = _relations(prim, path)
+            rig = read_rig_at(prim, path)
             _stored_frames(prim, path)
             for name in rig.free:
                 _curve(prim, name, np.zeros(1), path)
@@ -208,7 +208,8 @@ def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Problem]:
             yield Problem("broken-rig", str(error), where, "error")
 
 
-def _relations(prim: Usd.Prim, path: Path) -> ReducedRig:
+def read_rig_at(prim: Usd.Prim, path: Path) -> ReducedRig:
+    """Read the relations of the rig at a prim; see `read_rig`."""
     version = prim.GetAttribute("usdhand:version").Get()
     if version != VERSION:
         raise InputError(

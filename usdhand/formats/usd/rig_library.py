@@ -9,10 +9,10 @@ from pxr import Sdf
 from usdhand.formats.output import check_output
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.damage import damage_refused
-from usdhand.formats.usd.rig import RIG_NAME, find_rig, read_rig_on, rig_prims
+from usdhand.formats.usd.rig import RIG_NAME, find_rig, read_rig_at, rig_prims
 from usdhand.formats.usd.rig_author import author_relations
-from usdhand.formats.usd.stage import open_stage
-from usdhand.formats.usd.write import save_layer
+from usdhand.formats.usd.stage import Character, character_on, open_stage
+from usdhand.formats.usd.write import describe_layer, save_layer
 from usdhand.reduce.rig import ReducedRig
 
 
@@ -29,24 +29,30 @@ def write_fitted_rig(rig: ReducedRig, output: str | Path, *, force: bool = False
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     with Sdf.ChangeBlock():
         author_relations(layer, Sdf.Path(f"/{RIG_NAME}"), rig)
-        layer.defaultPrim = RIG_NAME
-        layer.pseudoRoot.SetInfo("upAxis", "Y")
-        layer.pseudoRoot.SetInfo("metersPerUnit", 0.01)
+        describe_layer(layer, RIG_NAME)
     save_layer(layer, output, flatten=False)
 
 
-def rig_in(path: Path, skel: str | None = None) -> tuple[ReducedRig, bool] | None:
-    """The rig of a USD file and whether it has a character; None if there is none.
+def read_with_rig(
+    path: Path, skel: str | None = None
+) -> tuple[ReducedRig | None, Character | None]:
+    """The rig of a USD file, if it has one, and its character.
+
+    There is no character where the rig was fitted without one.
 
     Raises
     ------
     InputError
         if the file cannot be read, or holds several rigs, or one that contradicts itself.
+    UsageError
+        if several skeletons are there and ``skel`` does not choose one.
     """
-    stage, _ = open_stage(path)
+    stage, problems = open_stage(path)
+    rig = None
     with damage_refused(path):
-        if not any(True for _ in rig_prims(stage)):
-            return None
-        prim = find_rig(stage, path, skel)
-        bound = bool(prim.GetRelationship("usdhand:skeleton"))
-    return read_rig_on(stage, path, skel), bound
+        if any(True for _ in rig_prims(stage)):
+            prim = find_rig(stage, path, skel)
+            rig = read_rig_at(prim, path)
+            if not prim.GetRelationship("usdhand:skeleton"):
+                return rig, None
+    return rig, character_on(stage, path, problems, skel)

@@ -90,14 +90,14 @@ def _first_difference(then: Character, now: Character, ignored: Collection[str])
         return f"it has the joint '{missing[0]}'"
     if then.animation is None or now.animation is None:
         return None
-    times = [_times(character) for character in (then, now)]
+    queries = [_query(character) for character in (then, now)]
+    times = [_times(query) for query in queries]
     if len(times[0]) and len(times[1]) and not np.allclose(times[0][[0, -1]], times[1][[0, -1]]):
         return f"its motion is at time codes {times[1][0]:g} to {times[1][-1]:g}"
     if len(times[0]) == 0 < len(times[1]):
         return "it moves"
     compared = [i for i, joint in enumerate(joints) if joint not in ignored]
     places = [old.index(joints[i]) for i in compared]
-    queries = [_query(character) for character in (then, now)]
     for time in times[1].tolist() or [0.0]:
         a, b = (_locals(query, time) for query in queries)
         if a is None or b is None:
@@ -110,8 +110,8 @@ def _first_difference(then: Character, now: Character, ignored: Collection[str])
     return None
 
 
-def _times(character: Character) -> Array:
-    query = _query(character).GetAnimQuery()
+def _times(skeleton: UsdSkel.SkeletonQuery) -> Array:
+    query = skeleton.GetAnimQuery()
     return np.array(query.GetJointTransformTimeSamples() if query else [], dtype=np.float64)
 
 

@@ -146,6 +146,13 @@ def find_character(path: Path, skel: str | None = None) -> Character:
         if several skeletons are there and ``skel`` does not choose one.
     """
     stage, problems = open_stage(path)
+    return character_on(stage, path, problems, skel)
+
+
+def character_on(
+    stage: Usd.Stage, path: Path, problems: tuple[Problem, ...], skel: str | None = None
+) -> Character:
+    """The character of a stage that was opened from ``path``; see `find_character`."""
     skeletons = find_skeletons(stage)
     if not skeletons:
         lost = f" Note: {problems[0]}." if problems else ""

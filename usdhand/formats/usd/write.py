@@ -359,6 +359,13 @@ def within_samples(character: Character, times: NDArray[np.float64]) -> bool:
     return bool(first - SAME_CODE <= times[0] and times[-1] <= last + SAME_CODE)
 
 
+def describe_layer(layer: Sdf.Layer, default_prim: str) -> None:
+    """Say of a layer that is over no other one: its default prim, centimetres, Y up."""
+    layer.defaultPrim = default_prim
+    layer.pseudoRoot.SetInfo("upAxis", "Y")
+    layer.pseudoRoot.SetInfo("metersPerUnit", 0.01)
+
+
 def extend_time(layer: Sdf.Layer, times: NDArray[np.float64]) -> None:
     """Let a layer's time range hold these time codes."""
     if not layer.HasStartTimeCode() or layer.startTimeCode > times[0]:
