@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -290,39 +291,20 @@ def cases(folder: Path) -> Iterator[Case]:
         "is not possible",
         lambda: usdhand.reduce_hands([clip], usdhand.ReduceSettings(max_error=0.0)),
     )
-    yield Case(
-        "retarget_hands",
-        no_hand,
-        "no hand in common",
-        lambda: usdhand.retarget_hands(left, with_hand(clip, "Right")),
-    )
-    yield Case(
-        "retarget_hands",
-        no_hand,
-        "no finger joint in common",
-        lambda: usdhand.retarget_hands(
-            with_hand(clip, "Left", "Index|Middle"), with_hand(clip, "Left", "Ring|Pinky")
-        ),
-    )
+    some, others = (with_hand(clip, "Left", d) for d in ("Index|Middle", "Ring|Pinky"))
+    apart = {"no hand in common": (left, with_hand(clip, "Right"))}
+    apart["no finger joint in common"] = (some, others)
+    for name, function in (
+        ("retarget_hands", usdhand.retarget_hands),
+        ("splice_hands", usdhand.splice_hands),
+    ):
+        for words, pair in apart.items():
+            yield Case(name, no_hand, words, partial(function, *pair))
     yield Case(
         "run",
         usdhand.UsdHandError,
         "no such file",
         lambda: usdhand.run(usdhand.CompareRequest(a=OK, b=nothing)),
-    )
-    yield Case(
-        "splice_hands",
-        no_hand,
-        "no hand in common",
-        lambda: usdhand.splice_hands(left, with_hand(clip, "Right")),
-    )
-    yield Case(
-        "splice_hands",
-        no_hand,
-        "no finger joint in common",
-        lambda: usdhand.splice_hands(
-            with_hand(clip, "Left", "Index|Middle"), with_hand(clip, "Left", "Ring|Pinky")
-        ),
     )
     yield Case(
         "splice_hands",

@@ -97,6 +97,16 @@ def retimed(clip: Clip, truth: Array, fps: float) -> Clip:
     """The clip such that its frame t is shown at second truth[t], sampled at another rate."""
     count = int(np.floor(truth[-1] * fps + 1e-6)) + 1
     at = np.interp(np.arange(count) / fps, truth, np.arange(len(truth)))
+    return _at_frames(clip, at, fps)
+
+
+def shown_at(clip: Clip, source: Array, fps: float) -> Clip:
+    """The clip's moments (frames,) in seconds, one a frame of another rate."""
+    return _at_frames(clip, source * clip.fps, fps)
+
+
+def _at_frames(clip: Clip, at: Array, fps: float) -> Clip:
+    """The clip at these of its frames, whole or not, one a frame of another rate."""
     origin = replace(clip.origin, time_codes_per_frame=clip.origin.time_codes_per_second / fps)
     return replace(
         clip,

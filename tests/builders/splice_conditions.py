@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from builders.known_pairs import MOVING_CM_S, arms_only, smaller, turned
+from builders.known_pairs import MOVING_CM_S, arms_only, shown_at, smaller, turned
 from builders.two_bones import with_wrist_at, wrist_from_shoulder
 from scipy.ndimage import gaussian_filter1d
 
@@ -147,11 +147,11 @@ def condition_pair(condition: Condition, file: Path, seed: int) -> ConditionPair
     )
     warped = hand_times(random, length, condition.fps, condition.warp_hz)
     hand_source = with_waits(warped, condition.fps, condition.rest[1], at, condition.pause[1])
-    body = shown(take, body_source, take.fps)
+    body = shown_at(take, body_source, take.fps)
     if condition.body_noise_cm:
         body = _disturbed(body, hands, random, condition.body_noise_cm)
     source: dict[Side, Array] = dict.fromkeys(hands.frames, hand_source)
-    other = shown(take, hand_source, condition.fps)
+    other = shown_at(take, hand_source, condition.fps)
     if condition.apart:
         source["left"] = np.clip(
             np.interp(
@@ -162,7 +162,7 @@ def condition_pair(condition: Condition, file: Path, seed: int) -> ConditionPair
             0.0,
             length,
         )
-        other = _with_arm_of(other, shown(take, source["left"], condition.fps), hands, "left")
+        other = _with_arm_of(other, shown_at(take, source["left"], condition.fps), hands, "left")
     other = _performed(other, hands, condition, random)
     if condition.gaps:
         other = _frozen(other, hands, condition.gaps, random)
@@ -212,20 +212,6 @@ def with_waits(source: Array, fps: float, rest: float, at: float, pause: float) 
             source[k:],
             np.full(ends, source[-1]),
         ]
-    )
-
-
-def shown(clip: Clip, source: Array, fps: float) -> Clip:
-    """The clip's moments (frames,) in seconds, one a frame of another rate."""
-    at = source * clip.fps
-    origin = replace(clip.origin, time_codes_per_frame=clip.origin.time_codes_per_second / fps)
-    return replace(
-        clip,
-        rotations=interpolate_rotations(clip.rotations, at),
-        translations=interpolate(clip.translations, at),
-        scales=interpolate(clip.scales, at),
-        fps=fps,
-        origin=origin,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from builders.moving_markers import moving_hand
 from builders.splice_conditions import CONDITIONS, condition_pair
 from conftest import REPOSITORY
 from hypothesis import given
@@ -88,21 +89,12 @@ def test_what_is_uncertain_is_printed_and_pins_are_proposed_in_order() -> None:
         assert len(hand["deviation"]) == len(body)
 
 
-def moving(seconds: np.ndarray) -> Markers:
-    t = seconds[:, None] * [1.0, 1.3, 0.7] * 2 * np.pi * 0.6
-    wrist = 15.0 * np.sin(t + np.arange(3.0))
-    bend = 0.4 * np.sin(t[:, :1] * 1.4)
-    forearm = np.concatenate([np.sin(bend), 0 * bend, np.cos(bend)], axis=1)
-    around = np.array([[4.0, 0.0, 0.0], [-4.0, 0.0, 0.0], [0.0, 0.0, -18.0], [0.0, 0.0, 13.0]])
-    return Markers(wrist[:, None] + around, wrist, forearm, None, 60.0, "shoulder")
-
-
 def test_pass_2_gives_way_where_kinds_of_evidence_contradict_each_other() -> None:
     rows, freedom = np.arange(400.0), np.full(400, 45.0)
-    body = moving((rows + 3.0) / 60.0)
-    agreed = trust([(body, moving(rows / 60.0))], [rows], freedom, "local")
+    body = moving_hand((rows + 3.0) / 60.0)
+    agreed = trust([(body, moving_hand(rows / 60.0))], [rows], freedom, "local")
     assert agreed.min() > 0.9
-    true, other = moving(rows / 60.0), moving((rows + 9.0) / 60.0)
+    true, other = moving_hand(rows / 60.0), moving_hand((rows + 9.0) / 60.0)
     odd = Markers(
         true.positions, true.wrist, other.forearm, None, 60.0, "shoulder"
     )  # bends say the opposite of paths

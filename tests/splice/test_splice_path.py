@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from builders.moving_markers import moving_hand
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.splice_2006 import algorithm_1, best_turn, distance_of_signs
@@ -19,7 +20,6 @@ from usdhand.dtw.phases import (
 )
 from usdhand.errors import UsageError
 from usdhand.splice.band import anchors_of, band_along, checked_pins, pinned_band
-from usdhand.splice.markers import Markers
 from usdhand.splice.phases import smoothed
 from usdhand.splice.refine import refined
 from usdhand.splice.settings import Pin, SpliceSettings
@@ -207,16 +207,6 @@ def test_wide_smoothing_is_nearly_gaussian() -> None:
     found = smoothed(pulse, 60.0)
     assert np.abs(found - gauss).max() < 0.08 * gauss.max()
     assert abs(np.sqrt(np.sum(found * t**2)) - 60.0) < 1.0
-
-
-def moving_hand(seconds: np.ndarray) -> Markers:
-    """Markers of a hand that moves and bends, at these moments of it."""
-    t = seconds[:, None] * [1.0, 1.3, 0.7] * 2 * np.pi * 0.6
-    wrist = 15.0 * np.sin(t + np.arange(3.0))
-    bend = 0.4 * np.sin(t[:, :1] * 1.4)
-    forearm = np.concatenate([np.sin(bend), 0 * bend, np.cos(bend)], axis=1)
-    around = np.array([[4.0, 0.0, 0.0], [-4.0, 0.0, 0.0], [0.0, 0.0, -18.0], [0.0, 0.0, 13.0]])
-    return Markers(wrist[:, None] + around, wrist, forearm, None, 60.0, "shoulder")
 
 
 def test_pass_2_finds_parts_of_a_frame_and_stays_where_it_may_not_move() -> None:
