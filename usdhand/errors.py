@@ -43,7 +43,7 @@ class CrashedError(InputError):
 
 
 class UnforeseenError(UsdHandError):
-    """An error that nobody expected, in one file of several (exit 1)."""
+    """An error that nobody expected (exit 1)."""
 
     code = "unforeseen"
 

@@ -6,15 +6,19 @@ schema and the docs alike. No numpy: a verb's options are known before it is loa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
+from numbers import Integral, Real
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from usdhand.errors import UsageError
 
 Role = Literal["argument", "option", "settings"]
+
+# Simple types in words.
+WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
 @dataclass(frozen=True)
@@ -137,20 +141,62 @@ def allows_none(kind: Any) -> bool:
     return get_origin(kind) in (Union, UnionType) and type(None) in get_args(kind)
 
 
-def check_choices(value: Any) -> None:
-    """Refuse a dataclass with a choice that there is not.
+def check_values(value: Any) -> None:
+    """Refuse a dataclass with a choice that there is not, or a value that is no number, text or so.
 
     Raises
     ------
     UsageError
-        if a field of a Literal type has another value.
+        if a field of a Literal type has another value, or one of a simple type one of another.
     """
     owner: type = type(value)
     for name, choices in _choices(owner).items():
         chosen = getattr(value, name)
-        if chosen not in choices:
+        if not any(chosen is c or (type(chosen) is type(c) and chosen == c) for c in choices):
             named = ", ".join(str(choice) for choice in choices if choice is not None)
             raise UsageError(f"There is no {name} '{chosen}'; there are {named}.")
+    for name, (kinds, optional) in _simple(owner).items():
+        given = getattr(value, name)
+        if given is None and optional:
+            continue
+        if not any(_is_of(kind, given) for kind in kinds):
+            wanted = " or ".join(_described(kind) for kind in kinds)
+            raise UsageError(f"{name} cannot be {given!r}: {wanted} is needed.")
+
+
+def _is_of(kind: Any, value: Any) -> bool:
+    """Whether a value is of a simple type, or a tuple of such; numbers may be numpy's."""
+    if inner := get_args(kind):
+        return (
+            isinstance(value, Sequence)
+            and len(value) == len(inner)
+            and all(_is_of(one, part) for one, part in zip(inner, value, strict=True))
+        )
+    if isinstance(value, bool) or kind in (bool, str):
+        return isinstance(value, kind) and (kind is bool) == isinstance(value, bool)
+    return isinstance(value, Real if kind is float else Integral)
+
+
+@cache
+def _simple(owner: type) -> dict[str, tuple[tuple[Any, ...], bool]]:
+    """Fields of simple types, or tuples of such, and whether each may be None."""
+    hints = get_type_hints(owner)
+    own = [(f.name, hints[f.name]) for f in fields(owner)]
+    return {
+        name: (alternatives(kind), allows_none(kind))
+        for name, kind in own
+        if all(_is_simple(one) for one in alternatives(kind))
+    }
+
+
+def _is_simple(kind: Any) -> bool:
+    if get_origin(kind) is tuple:
+        return all(one in WORDS for one in get_args(kind))
+    return kind in WORDS
+
+
+def _described(kind: Any) -> str:
+    return WORDS.get(kind) or f"a list of {len(get_args(kind))} numbers"
 
 
 @cache

@@ -39,9 +39,9 @@ class Problem:
         return f"{self.message} ({self.where})" if self.where else self.message
 
 
-def counted(count: int, noun: str) -> str:
-    """Say a number and what it counts: 1 clip, 2 clips."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+def counted(count: int, one: str, more: str = "") -> str:
+    """Say a number and what it counts: 1 clip, 2 clips; ``more`` where an s does not make it."""
+    return f"{count} {one if count == 1 else more or one + 's'}"
 
 
 def listed(names: Sequence[str], most: int = LISTED) -> str:

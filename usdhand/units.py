@@ -1,6 +1,10 @@
-"""Units of length by name. Standard library only."""
+"""Units of length by name, and axes. Standard library only."""
 
 from __future__ import annotations
+
+from typing import Literal
+
+UpAxis = Literal["Y", "Z"]
 
 # Centimetres of a unit of length.
 UNITS = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}

@@ -13,8 +13,8 @@ import pytest
 
 from usdhand.report.document import dumps
 from usdhand.requests.codec import from_data, to_data
-from usdhand.verbs.outcome import Outcome
-from usdhand.verbs.schema import report_schema
+from usdhand.verbs.outcome import FAILURE, Outcome
+from usdhand.verbs.schema import failure_schema, report_schema
 
 
 @contextmanager
@@ -26,7 +26,7 @@ def judged() -> Iterator[None]:
     def document(outcome: Outcome) -> dict[str, Any]:
         made: dict[str, Any] = make(outcome)
         data = json.loads(dumps(made))
-        validator(data["request"]["verb"]).validate(data)
+        validator(FAILURE if outcome.failed else data["request"]["verb"]).validate(data)
         assert to_data(from_data(data["request"])) == data["request"]
         return made
 
@@ -37,8 +37,9 @@ def judged() -> Iterator[None]:
 
 @cache
 def validator(verb: str) -> jsonschema.Draft202012Validator:
-    """Schema of a verb's reports that allows no key which it does not name."""
-    return jsonschema.Draft202012Validator(closed(report_schema(verb)))
+    """Schema of a verb's reports, or of failures, that allows no key which it does not name."""
+    schema = failure_schema() if verb == FAILURE else report_schema(verb)
+    return jsonschema.Draft202012Validator(closed(schema))
 
 
 def closed(schema: Any) -> Any:

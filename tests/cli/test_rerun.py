@@ -65,6 +65,11 @@ def test_a_changed_input_is_refused_until_it_is_accepted(report: Path) -> None:
     assert "ok.usdc changed since" in message
     assert "--accept-changes" in message
     assert not Path("new.usda").exists()
+    Path("ok.usdc").rename("elsewhere.usdc")
+    for more in ([], ["--accept-changes"]):
+        message = run("rerun", report, "-o", "new.usda", *more, code=3).output
+        assert "ok.usdc cannot be found from here" in message
+    Path("elsewhere.usdc").rename("ok.usdc")
     assert "has changed" in run("rerun", report, "-o", "new.usda", "--accept-changes").output
     assert Path("new.usda").exists()
 
@@ -79,21 +84,30 @@ def test_splice_is_made_again_with_its_pins(tmp_path: Path) -> None:
     assert text(out) == before
 
 
+def _report(request: str, inputs: str = "[]") -> str:
+    return f'{{"schema": "usdhand.reduce/1", "request": {request}, "inputs": {inputs}}}'
+
+
 @pytest.mark.parametrize(
-    ("content", "code", "words"),
+    ("content", "words"),
     [
-        ("", 3, "not a JSON report"),
-        ("[" * 100_000, 3, "not a JSON report"),
-        ("{}", 3, "has no request"),
-        ('{"request": {"verb": "reduce"}, "inputs": [1]}', 3, "has no request"),
-        ('{"request": {"verb": "dance"}, "inputs": []}', 2, "no verb 'dance'"),
-        ('{"request": {"verb": "rerun", "report_file": "r.json"}, "inputs": []}', 2, "run again"),
+        ("", "not a JSON report"),
+        ("[" * 100_000, "not a JSON report"),
+        ("[]", "no JSON object"),
+        ("{}", "its 'schema' is none of usdhand"),
+        ('{"schema": "usdhand.reduce/1"}', "no 'request'"),
+        ('{"schema": "usdhand.reduce/2", "request": {}, "inputs": []}', "knows usdhand.reduce/1"),
+        (_report('{"verb": "reduce"}', "[1]"), "no list of 'inputs'"),
+        ('{"schema": "usdhand.reduce/1", "request": {"verb": "reduce"}}', "no list of 'inputs'"),
+        (_report('{"verb": "dance"}'), "no verb 'dance'"),
+        (_report('{"verb": "reduce", "clips": 3}'), "'clips' cannot be 3"),
+        (_report('{"verb": "rerun", "report_file": "r.json"}'), "cannot be run again"),
     ],
 )
-def test_what_is_no_report_is_refused(tmp_path: Path, content: str, code: int, words: str) -> None:
+def test_what_is_no_report_is_refused(tmp_path: Path, content: str, words: str) -> None:
     path = tmp_path / "r.json"
     path.write_text(content)
-    assert words in run("rerun", path, code=code).output
+    assert words in run("rerun", path, code=3).output
     assert "no such file" in run("rerun", tmp_path / "none.json", code=3).output.lower()
 
 

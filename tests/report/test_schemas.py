@@ -13,10 +13,10 @@ from builders.report_schemas import validator
 from conftest import REPOSITORY
 
 from usdhand.requests.verbs import VERBS
-from usdhand.verbs.schema import report_schema
+from usdhand.verbs.schema import failure_schema, report_schema
 
 OK = REPOSITORY / "samples" / "gestures" / "ok_01.usdc"
-REPORTING = [verb for verb in VERBS if verb not in ("schema", "rerun")]
+REPORTING = [verb for verb in VERBS if verb != "rerun"]
 
 
 @pytest.mark.parametrize("verb", REPORTING)
@@ -30,6 +30,16 @@ def test_every_verb_has_a_schema(verb: str) -> None:
 def test_verbs_without_a_report_say_so() -> None:
     assert "'rerun' makes no report" in run("schema", "--of-report", "rerun", code=2).output
     assert "Did you mean 'fill'" in run("schema", "--of-request", "fil", code=2).output
+
+
+def test_schemas_of_what_is_no_verb() -> None:
+    assert json.loads(run("schema", "--of-failure").stdout) == failure_schema()
+    assert json.loads(run("schema", "--of-edits").stdout)["title"]
+    report = json.loads(run("schema", "--of-report", "fill", "--json").stdout)
+    assert report["json_schema"] == report_schema("fill")
+    assert report["folder"] is None
+    said = run("schema", "--of-report", "fill", "--of-request", "fill", code=2).output
+    assert "--of-report and --of-request exclude each other" in said
 
 
 def test_a_report_with_a_fault_is_refused(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 
 # Amplitudes (see `euler_angles`) below this belong to more than 75 degrees of abduction, where a
@@ -95,16 +96,7 @@ def unwrapped(degrees: Array) -> Array:
 
 def product(a: Array, b: Array) -> Array:
     """Hamilton product of quaternions (4, frames) with the components first."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return np.stack(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ]
-    )
+    return np.stack(rot.product(a, b))
 
 
 def inverse(q: Array) -> Array:

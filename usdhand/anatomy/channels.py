@@ -31,6 +31,7 @@ from usdhand.errors import UsageError
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.problems import Problem, counted
 
 # The letters that abduction, flexion and twist have in a channel's name.
 FINGER_AXES = ("x", "y", "z")
@@ -189,7 +190,8 @@ def decode(channels: Channels, clip: Clip, frames: HandFrames) -> Clip:
 def _decode(channels: Channels, clip: Clip, hands: Iterable[HandFrames]) -> Clip:
     if len(channels.values) != len(clip):
         raise UsageError(
-            f"Channels of {len(channels.values)} frames do not match a clip of {len(clip)}."
+            f"Channels of {counted(len(channels.values), 'frame')} do not match a clip of "
+            f"{len(clip)}."
         )
     return _with(clip, [local_motion(channels, clip, frames) for frames in hands])
 
@@ -245,6 +247,16 @@ class Hands:
     def notes(self) -> tuple[str, ...]:
         """What was guessed about the hands and their frames, in words."""
         return (*self.character.notes, *(n for f in self.frames.values() for n in f.notes))
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """What was guessed, as notes, and names that the bind pose contradicts, as warnings."""
+        warned = set(self.character.contradictions)
+        guesses = (note for note in self.notes if note not in warned)
+        return (
+            *self.character.problems,
+            *(Problem("hands", guess, severity="note") for guess in guesses),
+        )
 
     @property
     def all_names(self) -> tuple[str, ...]:

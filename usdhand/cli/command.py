@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import inspect
-from dataclasses import replace
-from typing import Any
 
 import click
-from click.core import ParameterSource
 
-from usdhand.cli.console import Bar, say, show
-from usdhand.cli.parameters import name_of, parameters
-from usdhand.options import declared
+from usdhand.cli.bar import Bar
+from usdhand.cli.console import foreseen, say, show
+from usdhand.cli.given import request_of
+from usdhand.cli.parameters import parameters
 from usdhand.problems import Problem
 from usdhand.requests.base import Request
-from usdhand.requests.codec import base_of
 from usdhand.requests.verbs import request_class
 
 
@@ -47,10 +44,16 @@ def _call(owner: type[Request]) -> None:
         if problem.severity == "error" or not (quiet or (as_json and problem.severity == "note")):
             show(problem)
 
-    from usdhand.verbs.run import run
+    from usdhand.verbs.outcome import Journal, failed
+    from usdhand.verbs.run import run_verb
 
+    journal = Journal(listen, bar)
     try:
-        outcome = run(request, listener=listen, watch=bar)
+        outcome = run_verb(request, journal)
+    except Exception as error:
+        if as_json:
+            click.echo(failed(request, journal, foreseen(error)).to_json())
+        raise
     finally:
         bar.close()
     if as_json:
@@ -61,24 +64,3 @@ def _call(owner: type[Request]) -> None:
         if outcome.drawn is not None:
             say(f"plots written to {outcome.drawn}")
     context.exit(outcome.exit_code)
-
-
-def request_of(owner: type[Request], context: click.Context) -> Request:
-    """Make the request of what was given on the command line.
-
-    Of settings, what was not given is as the option that chooses between them says.
-    """
-    values = context.params
-    made: dict[str, Any] = {}
-    for own in declared(owner):
-        if own.option.role != "settings":
-            made[own.name] = values[own.name]
-            continue
-        inner = {d.name: name_of(d, own) for d in declared(own.type)}
-        given = {n: values[p] for n, p in inner.items() if _given(context, p)}
-        made[own.name] = replace(base_of(own, values.get(own.option.chosen_by)), **given)
-    return owner(**made)
-
-
-def _given(context: click.Context, name: str) -> bool:
-    return context.get_parameter_source(name) is not ParameterSource.DEFAULT

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from usdhand.cli.command import command_of
-from usdhand.cli.console import complain
+from usdhand.cli.console import complain, foreseen
 from usdhand.cli.interrupt import Interrupt, end_interrupted
 from usdhand.errors import UsdHandError
 from usdhand.requests.verbs import GROUPS, VERBS
@@ -58,16 +58,8 @@ class VerbGroup(click.Group):
                 end_interrupted()
             if ctx.find_root().params.get("debug"):
                 raise
-            complain(unforeseen(error))
+            complain(f"Error: {foreseen(error)}")
             ctx.exit(1)
-
-
-def unforeseen(error: Exception) -> str:
-    """One line for an error that nobody expected: its kind and the start of what it says."""
-    said = " ".join(str(error).split()).encode("utf-8", "backslashreplace").decode()[:200]
-    name = type(error).__name__
-    what = f"{name}: {said}" if said else name
-    return f"Error: an unexpected error ({what}); usdhand --debug shows where"
 
 
 @click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})

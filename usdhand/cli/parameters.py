@@ -55,7 +55,9 @@ def _type(own: Declared, kind: Any) -> click.ParamType[Any]:
         return click.Choice([str(choice) for choice in get_args(kind)])
     least, most = own.option.at_least, own.option.at_most
     if kind is int and (least, most) != (None, None):
-        return click.IntRange(least, most)
+        whole = click.IntRange(least, most)
+        whole.name = "whole number"
+        return whole
     if kind is Path:
         return click.Path(path_type=Path)
     simple: Mapping[type, click.ParamType[Any]] = {float: click.FLOAT, int: click.INT}

@@ -229,7 +229,7 @@ def _why_none(library: MotionLibrary, body: Clip, hands: Hands, sides: Part, own
         return "The library is empty; build it from clips with body and fingers."
     if any(_shared_joints(library, hands, side, frozenset()) for side in sides):
         names = ", ".join(library.clips[i].name for i in sorted(own))
-        return f"The library contains only {body.name} itself ({names}); add other motion."
+        return f"The library contains only the body's own motion ({names}); add other motion."
     joints = "; ".join(f"{side}: {', '.join(hands.frames[side].names)}" for side in sides)
     return f"No clip of the library has any hand joint of {body.name} ({joints})."
 

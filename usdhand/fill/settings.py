@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 from usdhand.display import displayed
 from usdhand.errors import UsageError
-from usdhand.options import check_choices, option
+from usdhand.options import check_values, option
 
 Blend = Literal["smooth", "linear"]
 
@@ -143,7 +143,9 @@ class FillSettings:
     couple: bool = option("Take both hands from the same clip.", default=False)
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_values(self)
+        if isinstance(self.metric, str) and self.metric not in METRICS:
+            raise UsageError(f"There is no metric '{self.metric}'; there are {', '.join(METRICS)}.")
         if self.k < 1 or self.alternatives < 1:
             raise UsageError("Give at least one candidate and one alternative.")
         if self.factor < 1.0:

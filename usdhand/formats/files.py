@@ -87,7 +87,9 @@ def animation_names(path: str | Path) -> tuple[str, ...]:
         if the file cannot be used.
     """
     path = Path(path)
-    return ("",) if is_usd(path) else tuple(_reader(path).animation_names(path))
+    own = is_usd(path)
+    _check_file(path)
+    return ("",) if own else tuple(_reader(path).animation_names(path))
 
 
 def write_other(clip: Clip, path: Path, suffix: str, up: str = "Y") -> tuple[Problem, ...]:
@@ -119,9 +121,13 @@ def is_usd(path: Path) -> bool:
     return suffix in USD_SUFFIXES
 
 
-def _reader(path: Path) -> Any:
+def _check_file(path: Path) -> None:
     if why := why_no_file(path):
         raise InputError(f"{path}: {why}.")
+
+
+def _reader(path: Path) -> Any:
+    _check_file(path)
     return importlib.import_module(f"{FORMATS[path.suffix.lower()]}.read")
 
 

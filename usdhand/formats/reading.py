@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from usdhand.display import displayed
-from usdhand.options import check_choices, option
+from usdhand.options import check_values, option
 from usdhand.units import read_unit
 
 
@@ -49,7 +49,7 @@ class Reading:
     )
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_values(self)
 
 
 DEFAULT = Reading()

@@ -5,8 +5,9 @@ Every message names the argument and the first frame and joint that it is about.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -14,18 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import rotations as rot
-from usdhand.motion.rotations import Array
+from usdhand.motion.rotations import UNIT_TOLERANCE, Array
 from usdhand.motion.skeleton import Skeleton, leaf_name, parents_from_paths
 from usdhand.motion.transforms import affine, decompose_trs, local_matrices, to_y_up
 from usdhand.problems import Problem
-from usdhand.units import read_unit
+from usdhand.units import UpAxis, read_unit
 
 Quaternions = Literal["xyzw", "wxyz"]
-UpAxis = Literal["Y", "Z"]
 
-# Quaternions whose length is 1 within this are rounded, even in half precision, and are brought to
-# length 1. What is further off is no rotation.
-UNIT_TOLERANCE = 1e-3
 # Quaternions in the wrong order: read as said, the median joint is turned further from the bind
 # pose than the first, and the other way nearer than the second. No body moves like that. Some
 # frames tell as well as all.
@@ -196,13 +193,10 @@ def rate_of(fps: float) -> float:
     UsageError
         if it is no positive number.
     """
-    try:
-        rate = float(fps)
-    except (TypeError, ValueError):
-        rate = np.nan
-    if not 0.0 < rate < np.inf:
+    number = isinstance(fps, Real) and not isinstance(fps, bool)
+    if not number or not 0.0 < fps < np.inf:
         raise UsageError(f"fps: {fps!r} frames a second are not possible: give a number above 0.")
-    return rate
+    return float(fps)
 
 
 def _centimetres(units: str | float) -> float:
@@ -237,9 +231,10 @@ def _parents_first(parents: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _names(joints: Sequence[str]) -> list[str]:
-    if isinstance(joints, str) or not all(isinstance(name, str) for name in joints):
+    several = isinstance(joints, Iterable) and not isinstance(joints, str)
+    names = list(joints) if several else []
+    if not several or not all(isinstance(name, str) for name in names):
         raise UsageError("joints: give a list of names or paths.")
-    names = list(joints)
     if not names:
         raise UsageError("joints: there are none.")
     for number, name in enumerate(names):
@@ -274,7 +269,7 @@ def _checked_parents(names: list[str], parents: ArrayLike) -> NDArray[np.intp]:
     inside = (given >= -1) & (given < len(names)) & (given != np.arange(len(names)))
     if (bad := _first(~(whole & inside))) is not None:
         raise UsageError(
-            f"parents: {given[bad]:.0f} is not a possible parent of joint {bad[0]} "
+            f"parents: {given[bad]:g} is not a possible parent of joint {bad[0]} "
             f"'{names[bad[0]]}': give the index of another joint, 0 to {len(names) - 1}, or -1 for "
             "a root."
         )
@@ -310,6 +305,8 @@ def _matrices(name: str, values: ArrayLike, joints: Sequence[str]) -> Array:
 def _array(name: str, values: Any, form: str, *shapes: tuple[int | None, ...]) -> Array:
     """Numbers of one of these shapes, in an array of their own; None fits any length."""
     try:
+        if np.iscomplexobj(values):
+            raise TypeError("its numbers are complex")
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, RuntimeError) as error:
         raise UsageError(f"{name}: this is not an array of numbers ({error}).") from error
@@ -318,7 +315,7 @@ def _array(name: str, values: Any, form: str, *shapes: tuple[int | None, ...]) -
             want in (None, have) for want, have in zip(shape, array.shape, strict=True)
         ):
             return array
-    wanted = " or ".join("(" + ", ".join(str(n or "frames") for n in s) + ")" for s in shapes)
+    wanted = " or ".join(str(tuple(n or "frames" for n in s)).replace("'", "") for s in shapes)
     raise UsageError(f"{name}: the shape is {array.shape}; it must be {form}, that is {wanted}.")
 
 

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from usdhand.display import displayed
-from usdhand.motion.arrays import ArrayRig, Quaternions, UpAxis, rate_of
+from usdhand.errors import UsageError
+from usdhand.motion.arrays import ArrayRig, Quaternions, rate_of
 from usdhand.motion.rotations import Array
 from usdhand.motion.skeleton import Skeleton
 from usdhand.motion.timing import time_codes
 from usdhand.motion.transforms import decompose, with_even_signs
 from usdhand.problems import Problem
+from usdhand.units import UpAxis
 
 
 @displayed()
@@ -170,6 +172,8 @@ class Clip:
         >>> clip.translations[0].tolist()
         [[0.0, 100.0, 0.0], [0.0, 40.0, 0.0], [0.0, 30.0, 0.0]]
         """
+        if not isinstance(name, str):
+            raise UsageError(f"name: {name!r} is no text.")
         rig = ArrayRig.of(joints, parents, bind, rest, units, up)
         turned = rig.rotations(rotations, quaternions)
         moved = rig.translations(translations, len(turned))

@@ -6,6 +6,7 @@ command feel slow; the few lines needed are here instead and tested against it.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,22 +15,27 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 IDENTITY: Array = np.array([0.0, 0.0, 0.0, 1.0])
+# Quaternions whose length is 1 within this are rounded, even in half precision; what is further off
+# is no rotation.
+UNIT_TOLERANCE = 1e-3
 Y_UP_FROM_Z_UP: Array = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
 def multiply(a: Array, b: Array) -> Array:
     """Hamilton product ``a * b`` (first ``b``, then ``a``), broadcasting; shape (..., 4)."""
-    ax, ay, az, aw = np.moveaxis(a, -1, 0)
-    bx, by, bz, bw = np.moveaxis(b, -1, 0)
-    return np.stack(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ],
-        axis=-1,
-    )
+    return np.stack(product(np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)), axis=-1)
+
+
+def product(a: Iterable[Array], b: Iterable[Array]) -> list[Array]:
+    """Hamilton product of quaternions by their components x, y, z and w, as components."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return [
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    ]
 
 
 def conjugate(q: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from usdhand.display import displayed
 from usdhand.errors import UsageError
-from usdhand.options import check_choices, option
+from usdhand.options import check_values, option
 
 Fit = Literal["paper", "least-squares"]
 MeasureName = Literal["deg", "mm"]
@@ -136,7 +136,7 @@ class ReduceSettings:
     symmetric: bool = option("Leave the same channels of both hands free.", default=False)
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_values(self)
 
     @property
     def choice(self) -> Criteria:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted
 
 
 def check_result(findings: Sequence[Problem]) -> dict[str, Any]:
@@ -28,7 +28,9 @@ def summary(result: Mapping[str, Any], verbose: bool) -> str:
             continue
         found = file["findings"]
         errors = sum(f["severity"] == "error" for f in found)
-        lines.append(f"{file['path']}: {errors} errors, {len(found) - errors} warnings")
+        lines.append(
+            f"{file['path']}: {counted(errors, 'error')}, {counted(len(found) - errors, 'warning')}"
+        )
         for f in found:
             where = f" ({f['where']})" if f["where"] else ""
             lines.append(f"  {f['severity']}: {f['message']}{where} [{f['code']}]")

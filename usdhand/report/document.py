@@ -24,10 +24,11 @@ def document(
     inputs: Sequence[Path],
     settings: Mapping[str, Any],
     result: Mapping[str, Any],
+    name: str = "",
 ) -> dict[str, Any]:
-    """Wrap a result with what is needed to make it again."""
+    """Wrap a result with what is needed to make it again; ``name`` is the verb's if empty."""
     return {
-        "schema": f"usdhand.{request.verb.split()[0]}/{SCHEMA_VERSION}",
+        "schema": f"usdhand.{name or request.verb.split()[0]}/{SCHEMA_VERSION}",
         "usdhand": __version__,
         "request": to_data(request),
         "inputs": [{"path": str(p), "sha256": file_hash(p)} for p in inputs],

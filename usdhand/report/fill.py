@@ -51,7 +51,9 @@ def summary(result: Mapping[str, Any], verbose: bool) -> str:
     """A line a hand, the costs of alternatives, and every segment if ``verbose``."""
     lines = []
     for side, paths in result.get("added_joints", {}).items():
-        lines.append(f"{side} hand: {len(paths)} joints added from {result['fingers_from']}")
+        lines.append(
+            f"{side} hand: {counted(len(paths), 'joint')} added from {result['fingers_from']}"
+        )
     for side, hand in result["hands"].items():
         clips = {s["clip"] for s in hand["segments"]}
         seams = hand["seams"]

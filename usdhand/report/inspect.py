@@ -9,6 +9,7 @@ from usdhand.anatomy import Hands
 from usdhand.anatomy.channels import is_flexion
 from usdhand.anatomy.hand import CharacterMap, HandMap
 from usdhand.motion import Clip
+from usdhand.problems import counted
 from usdhand.reduce.rig import ReducedRig
 from usdhand.report.document import rounded
 from usdhand.report.reduce import relation_lines, relations_data
@@ -37,7 +38,7 @@ def inspect_result(clip: Clip, hands: Hands | None, animated: bool = True) -> di
             result["channels"] = _channel_ranges(clip, hands)
             result["off_axis_share"] = _off_axis_shares(clip, hands)
         result["notes"] = list(hands.notes)
-        result["problems"] += problems_data(hands.character.problems)
+        result["problems"] += problems_data(hands.problems)
     return result
 
 
@@ -128,13 +129,13 @@ def _text(result: Mapping[str, Any], verbose: bool) -> str:
     skeleton = f"skeleton {result['skeleton']}, " if result["skeleton"] else ""
     lines = [
         f"{result['path']}",
-        f"  {skeleton}{result['joints']} joints, "
+        f"  {skeleton}{counted(result['joints'], 'joint')}, "
         f"{result['cm_per_unit']:g} cm per unit, {result['up_axis']} up",
     ]
     if result["animation"]:
         lines.append(
-            f"  motion {result['animation']}, {result['frames']} frames at {result['fps']:g} fps, "
-            f"{result['start_s']:.3f} to {result['end_s']:.3f} s"
+            f"  motion {result['animation']}, {counted(result['frames'], 'frame')} at "
+            f"{result['fps']:g} fps, {result['start_s']:.3f} to {result['end_s']:.3f} s"
         )
     elif "animations" in result:
         names = ", ".join(f"'{name}'" for name in result["animations"])
@@ -145,8 +146,6 @@ def _text(result: Mapping[str, Any], verbose: bool) -> str:
         lines.append(f"  no hands: {result['hand_error']}")
     else:
         lines += _hand_lines(result, verbose)
-    warned = {p["message"] for p in result["problems"]}
-    lines += [f"  note: {note}" for note in result.get("notes", ()) if note not in warned]
     lines += [
         f"  {p['severity']}: {p['message']}" + (f" ({p['where']})" if p["where"] else "")
         for p in result["problems"]
@@ -158,7 +157,9 @@ def _rig_lines(rig: Mapping[str, Any]) -> list[str]:
     relations = rig["relations"]
     kinds = [r["kind"] for r in relations]
     sources = rig["fitted_to"]
-    clips = f"{len(sources)} clips" if len(sources) > 1 else "".join(sources) or "no named clip"
+    clips = (
+        counted(len(sources), "clip") if len(sources) > 1 else "".join(sources) or "no named clip"
+    )
     head = (
         f"  hand rig: {rig['free_channels']} of {rig['total_channels']} channels free, "
         f"{kinds.count('linear')} follow, {kinds.count('constant')} constant; "
@@ -172,8 +173,9 @@ def _hand_lines(result: Mapping[str, Any], verbose: bool) -> list[str]:
     for side, hand in result["hands"].items():
         missing = f", without {', '.join(hand['missing'])}" if hand["missing"] else ""
         lines.append(
-            f"    {side}: {len(hand['joints'])} joints{missing}, wrist {_leaf(hand['wrist'])}, "
-            f"elbow {_leaf(hand['elbow'])}, shoulder {_leaf(hand['shoulder'])}"
+            f"    {side}: {counted(len(hand['joints']), 'joint')}{missing}, "
+            f"wrist {_leaf(hand['wrist'])}, elbow {_leaf(hand['elbow'])}, "
+            f"shoulder {_leaf(hand['shoulder'])}"
         )
     body = ", ".join(f"{k} {_leaf(result[k])}" for k in ("hips", "chest", "neck", "head"))
     lines.append(f"    body: {body}")

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, get_args, get_origin
 
 from usdhand.display import displayed
 from usdhand.errors import UsageError
-from usdhand.options import alternatives, check_choices, declared
+from usdhand.options import alternatives, check_values, declared
 
 
 @displayed()
@@ -33,7 +33,7 @@ class Request:
         for own in declared(type(self)):
             value = getattr(self, own.name)
             object.__setattr__(self, own.name, _as_declared(own.name, own.type, value))
-        check_choices(self)
+        check_values(self)
 
     def reported(self) -> dict[str, Any]:
         """Return the settings as reports have them: by key, those of settings among the others."""
@@ -64,3 +64,14 @@ def _settings(value: Any, key: str) -> dict[str, Any]:
     keys = {own.name: own.key for own in declared(type(value))}
     found: Mapping[str, Any] = {keys.get(k, k): v for k, v in asdict(value).items()}
     return {key: found} if key else dict(found)
+
+
+def named_inputs(request: Request) -> Iterator[Path]:
+    """Files and folders that a request names, those that it writes not among them."""
+    for own in declared(type(request)):
+        value = getattr(request, own.name)
+        if own.option.role == "settings" or own.option.written:
+            continue
+        for one in value if isinstance(value, tuple) else (value,):
+            if isinstance(one, Path):
+                yield one

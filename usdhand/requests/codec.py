@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from usdhand.errors import UsageError
-from usdhand.options import Declared, allows_none, alternatives, declared, is_settings
+from usdhand.options import WORDS, Declared, allows_none, alternatives, declared, is_settings
 from usdhand.requests.base import Request
 from usdhand.requests.verbs import request_class
 
@@ -135,7 +135,6 @@ def _of(kind: Any, value: Any, where: str) -> Any:
 
 def described(kind: Any) -> str:
     """Say a type in words."""
-    words = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
     parts = []
     for one in alternatives(kind):
         if get_origin(one) is Literal:
@@ -145,7 +144,7 @@ def described(kind: Any) -> str:
         elif is_settings(one) or get_origin(one) is Mapping:
             parts.append("an object")
         else:
-            parts.append(words.get(one, "a path"))
+            parts.append(WORDS.get(one, "a path"))
     return " or ".join(parts)
 
 

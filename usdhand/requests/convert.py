@@ -8,12 +8,12 @@ from typing import ClassVar, Literal
 
 from usdhand.display import displayed
 from usdhand.formats.reading import Reading
-from usdhand.options import argument, check_choices, option, settings
+from usdhand.options import argument, check_values, option, settings
 from usdhand.requests import shared
 from usdhand.requests.base import Request
+from usdhand.units import UpAxis
 
 Suffix = Literal["usdc", "usda", "usd", "usdz", "bvh", "glb", "gltf"]
-UpAxis = Literal["Y", "Z"]
 RootMotion = Literal["keep", "drop"]
 
 
@@ -62,7 +62,7 @@ class Edits:
     up: UpAxis | None = option("Up axis of the output (USD and BVH). [default: Y]", default=None)
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_values(self)
 
     @property
     def of_frames(self) -> bool:
@@ -88,14 +88,8 @@ class ConvertRequest(Request):
 
     verb: ClassVar[str] = "convert"
     files: tuple[str, ...] = argument("Files, folders and wildcards.")
-    output: Path | None = option(
-        "The file to write; its suffix tells the format.",
-        "-o",
-        "--output",
-        default=None,
-        metavar="OUTPUT",
-        written=True,
-        reported=False,
+    output: Path | None = shared.output(
+        "The file to write; its suffix tells the format.", default=None
     )
     out_dir: Path | None = option(
         "Folder for the results of several inputs, or of all animations of one.",

@@ -29,14 +29,8 @@ class RerunRequest(Request):
     verb: ClassVar[str] = "rerun"
     verbose: ClassVar[str] = "Print all that the verb prints with -v."
     report_file: Path = argument("A report that a verb wrote with --report.", metavar="REPORT")
-    output: Path | None = option(
-        "Write here instead of where the report says.",
-        "-o",
-        "--output",
-        default=None,
-        metavar="OUTPUT",
-        written=True,
-        reported=False,
+    output: Path | None = shared.output(
+        "Write here instead of where the report says.", default=None
     )
     accept_changes: bool = option("Use inputs as they are now, also changed ones.", default=False)
     report: Path | None = shared.report()

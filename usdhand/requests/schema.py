@@ -31,4 +31,7 @@ class SchemaRequest(Request):
     of_request: str | None = option(
         "Print the JSON schema of a verb's requests.", default=None, metavar="VERB"
     )
+    of_failure: bool = option(
+        "Print the JSON schema of reports of runs that failed as a whole.", default=False
+    )
     of_edits: bool = option("Print the JSON schema of files of edits.", default=False)

@@ -10,9 +10,9 @@ from usdhand.options import option
 Sides = Literal["left", "right", "both"]
 
 
-def output(help: str) -> Any:  # noqa: A002
-    """``-o``: the file to write."""
-    return option(help, "-o", "--output", metavar="OUTPUT", written=True, reported=False)
+def output(help: str, **details: Any) -> Any:  # noqa: A002
+    """``-o``: the file to write; ``default=None`` where it need not be given."""
+    return option(help, "-o", "--output", metavar="OUTPUT", written=True, reported=False, **details)
 
 
 def force(what: str = "an output") -> Any:

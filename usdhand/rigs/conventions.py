@@ -274,6 +274,8 @@ def _convention(
 ) -> Convention:
     table = _inherit(name, tables, where)
     spelled = dict(_spelled_out(table))
+    if own and not spelled:
+        raise UsageError(f"{where}: [{name}] names no joint of a hand; see {_EXAMPLE}")
     if own:
         _check_apart(spelled, f"{where}: [{name}]")
     spellings: list[tuple[Side | None, str]] = [(None, "")]

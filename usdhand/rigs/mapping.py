@@ -9,6 +9,7 @@ from itertools import combinations
 from usdhand.anatomy.hand import ARM_JOINTS, BODY_JOINTS, DIGITS, SIDES, CharacterMap
 from usdhand.errors import HandNotFoundError
 from usdhand.motion.skeleton import Skeleton
+from usdhand.problems import counted, listed
 from usdhand.rigs.by_map_file import with_explicit
 from usdhand.rigs.by_names import match_names, named_body
 from usdhand.rigs.by_shape import FoundHand, find_hands, hand_size
@@ -89,11 +90,10 @@ def _hands_by_shape(rig: NamedJoints, conventions: Conventions) -> CharacterMap:
     found, reasons = find_hands(rig.skeleton, rig.points)
     if not found:
         shapes = "; ".join(reasons[:3]) or "no joint has three to five chains of joints below it"
-        some = ", ".join(rig.skeleton.names[:3])
         raise HandNotFoundError(
-            f"no hand found in {len(rig.names)} joints ({some}, ...): no names "
-            f"of the {len(conventions.conventions)} known conventions{_nearest_names(rig)}, and no "
-            f"joint chain looks like a hand: {shapes}; {ADVICE}"
+            f"no hand found in {counted(len(rig.names), 'joint')} ({listed(rig.skeleton.names)}): "
+            f"no names of the {len(conventions.conventions)} known conventions"
+            f"{_nearest_names(rig)}, and no joint chain looks like a hand: {shapes}; {ADVICE}"
         )
     notes = ["joint names are unknown: hands found by hierarchy and bind pose"]
     if len(found) > 1:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from usdhand.anatomy import Hands, Side
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted
 from usdhand.splice.locate import RATE, locate
 from usdhand.splice.markers import hand_markers
 from usdhand.splice.settings import Pin
@@ -43,7 +43,9 @@ def length_notes(
     """
     for name, clip in (("body", body), ("hand", hand_clip)):
         if len(clip) < 3:
-            raise InputError(f"The {name} clip {clip.name} has only {len(clip)} frames.")
+            raise InputError(
+                f"The {name} clip, {clip.name}, has only {counted(len(clip), 'frame')}."
+            )
     cells = band * body.duration * hand_clip.duration * fps**2
     if cells > MOST_CELLS:
         raise UsageError(

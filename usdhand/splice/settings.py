@@ -7,7 +7,7 @@ from typing import Literal
 
 from usdhand.display import displayed
 from usdhand.errors import UsageError
-from usdhand.options import check_choices, option
+from usdhand.options import check_values, option
 
 Align = Literal["local", "trunk"]
 Directions = Literal["spread", "axes"]
@@ -34,7 +34,7 @@ class Pin:
     name: str = ""
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_values(self)
 
     def __str__(self) -> str:
         return self.name or f"{self.body:g} s : {self.hand:g} s"
@@ -135,7 +135,7 @@ class SpliceSettings:
     tether: float = 0.3
 
     def __post_init__(self) -> None:
-        check_choices(self)
+        check_values(self)
         if not all(0.0 < width <= 1.0 for width in self.band):
             raise UsageError("Bands are shares of the body's length: above 0 and at most 1.")
         for name, (least, most) in LIMITS.items():

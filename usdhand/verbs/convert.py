@@ -39,15 +39,16 @@ from usdhand.motion.editing import (
 from usdhand.motion.resample import resample_like
 from usdhand.problems import Problem
 from usdhand.report.convert import convert_result, summary
-from usdhand.requests.convert import ConvertRequest, Edits, UpAxis
+from usdhand.requests.convert import ConvertRequest, Edits
 from usdhand.rigs import Conventions, load_conventions, map_character
+from usdhand.units import UpAxis
 from usdhand.verbs.clips import find_hands, misleading_names
 from usdhand.verbs.convert_jobs import Job, jobs_of
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 from usdhand.workers import each_apart
 
-MOST_FRAMES = 10_000_000
+MOST_MADE = 10_000_000
 
 
 @displayed(
@@ -159,8 +160,8 @@ def edit_frames(clip: Clip, edits: Edits, conventions: Conventions | None = None
     """
     clip = trim(clip, *edits.trim)
     if edits.fps is not None:
-        if edits.fps > 0 and clip.duration * edits.fps > MOST_FRAMES:
-            raise UsageError(f"{edits.fps:g} frames a second would make over {MOST_FRAMES} frames.")
+        if edits.fps > 0 and clip.duration * edits.fps > MOST_MADE:
+            raise UsageError(f"{edits.fps:g} frames a second would make over {MOST_MADE} frames.")
         clip = resample(clip, edits.fps)
     if edits.root_motion == "drop":
         clip = in_place(clip, _hips(clip, conventions))

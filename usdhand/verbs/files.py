@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -34,13 +35,15 @@ def find_files(arguments: Iterable[str], suffixes: Sequence[str] = READABLE) -> 
 def find_files_below(arguments: Iterable[str]) -> list[Path]:
     """Like `find_files`, but a folder stands for all clips in it and in the folders below.
 
-    Raises the errors of `find_files`.
+    Raises the errors of `find_files`, and InputError for a file that is not there.
     """
     found: dict[Path, Path] = {}
     for argument in arguments:
         folder = Path(argument)
         paths = _below(folder) if argument and folder.is_dir() else find_files([argument])
         for path in paths:
+            if not os.path.lexists(path):
+                raise InputError(f"{path}: no such file or folder.")
             found.setdefault(path.absolute(), path)
     return list(found.values())
 

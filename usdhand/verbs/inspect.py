@@ -11,6 +11,7 @@ from usdhand.formats.files import animation_names, read_any, read_character
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.read import motion_or_pose
 from usdhand.formats.usd.rig_library import read_with_rig
+from usdhand.problems import Problem
 from usdhand.reduce.rig import ReducedRig
 from usdhand.report.inspect import inspect_result, rig_result, summary
 from usdhand.report.plots import rigs
@@ -39,8 +40,9 @@ def run(request: InspectRequest, journal: Journal) -> Outcome:
             code = max(code, done.exit_code)
             found: dict[str, Any] = {"error": str(done)}
         else:
-            found, rig = done
+            found, rig, odd = done
             found_rigs += [rig] if rig else []
+            journal.about(path, odd)  # the text tells them below each file
         if "hand_error" in found:
             journal.fail(HandNotFoundError(found["hand_error"]))
             code = max(code, HandNotFoundError.exit_code)
@@ -61,14 +63,14 @@ def run(request: InspectRequest, journal: Journal) -> Outcome:
 
 def _inspect(
     path: Path, skel: str | None, conventions: Conventions | None
-) -> tuple[dict[str, Any], ReducedRig | None]:
+) -> tuple[dict[str, Any], ReducedRig | None, tuple[Problem, ...]]:
     rig, more = None, dict[str, Any]()
     if path.suffix.lower() in USD_SUFFIXES:
         rig, character = read_with_rig(path, skel)
         if rig is not None:
             more = {"rig": rig_result(rig)}
         if character is None:
-            return more, rig
+            return more, rig, ()
         clip, animated = motion_or_pose(character)
     elif len(names := animation_names(path)) > 1:
         clip, animated = read_character(path, skel), False
@@ -76,6 +78,9 @@ def _inspect(
     else:
         clip, animated = read_any(path, skel)
     try:
-        return inspect_result(clip, find_hands(clip, conventions), animated) | more, rig
+        hands = find_hands(clip, conventions)
     except HandNotFoundError as error:
-        return inspect_result(clip, None, animated) | more | {"hand_error": str(error)}, rig
+        more["hand_error"] = str(error)
+        return inspect_result(clip, None, animated) | more, rig, clip.problems
+    odd = (*clip.problems, *hands.problems)
+    return inspect_result(clip, hands, animated) | more, rig, odd

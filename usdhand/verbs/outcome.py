@@ -14,7 +14,7 @@ from usdhand.problems import Problem, Severity
 from usdhand.progress import each
 from usdhand.report.document import document, dumps
 from usdhand.report.text import problem_data
-from usdhand.requests.base import Request
+from usdhand.requests.base import Request, named_inputs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +23,8 @@ T = TypeVar("T")
 
 # Gets what is done, how many steps are done, and how many there are; False stops the run.
 Watch = Callable[[str, int, int], object]
+
+FAILURE = "failure"  # name of the format of reports without a result
 
 
 class Journal:
@@ -102,6 +104,7 @@ class Outcome:
     drawn : folder that plots were written to
     problems : everything odd, in the order in which it came
     exit_code : of the command line
+    failed : whether nothing came of it as a whole, so that the report has no result
     """
 
     request: Request
@@ -114,6 +117,7 @@ class Outcome:
     drawn: Path | None = None
     problems: tuple[Problem, ...] = ()
     exit_code: int = 0
+    failed: bool = False
 
     @cached_property
     def result(self) -> dict[str, Any]:
@@ -129,7 +133,8 @@ class Outcome:
             "written": list(self.written),
             "problems": [{"file": p.file, **problem_data(p)} for p in self.problems],
         }
-        return document(self.request, self.inputs, settings, self.result) | {"outcome": own}
+        name = FAILURE if self.failed else ""
+        return document(self.request, self.inputs, settings, self.result, name) | {"outcome": own}
 
     def to_json(self) -> str:
         """Return the report as text."""
@@ -138,3 +143,16 @@ class Outcome:
     def to_text(self, verbose: bool = False) -> str:
         """Return what a person wants to read."""
         return self.summary(self.result, verbose)
+
+
+def failed(request: Request, journal: Journal, error: UsdHandError) -> Outcome:
+    """What to report of a run that an error ended: its problems, and the error as the last one."""
+    return Outcome(
+        request,
+        tuple(named_inputs(request)),
+        dict,
+        lambda *_: "",
+        problems=(*journal.problems, Problem(error.code, str(error), severity="error")),
+        exit_code=error.exit_code,
+        failed=True,
+    )

@@ -225,8 +225,7 @@ def run(request: ReduceRequest, journal: Journal) -> Outcome:
         clips, request.settings, rig=rig, conventions=conventions, sides=sides(request.side)
     )
     for reduction in reductions:
-        for note in reduction.hands.notes:
-            journal.warn("hands", note, reduction.clip.origin.path)
+        journal.about(reduction.clip.origin.path, reduction.hands.problems, "warning", "note")
     if not request.dry_run:
         make_folder(outputs[0].parent)
         pairs = list(zip(reductions, outputs, strict=True))

@@ -11,6 +11,7 @@ from usdhand.errors import InputError, UsageError
 from usdhand.formats.hashing import file_hash
 from usdhand.inputs import read_json
 from usdhand.problems import Problem, listed
+from usdhand.report.document import SCHEMA_VERSION
 from usdhand.requests.base import Request
 from usdhand.requests.codec import from_data
 from usdhand.requests.rerun import RerunRequest
@@ -21,19 +22,32 @@ from usdhand.verbs.run import run_verb
 def run(request: RerunRequest, journal: Journal) -> Outcome:
     """Do what a report says was asked for, once its inputs are what they were."""
     report = _read(request.report_file)
-    asked = _changed(from_data(report["request"]), request)
-    if isinstance(asked, RerunRequest):
-        raise UsageError(f"{request.report_file}: a report of rerun cannot be run again.")
-    changed = _changes(report)
+    asked = _changed(_request(request.report_file, report), request)
+    changed, missing = _changes(report)
+    if missing:
+        raise InputError(
+            f"{request.report_file}: {listed(missing)} cannot be found from here. Go to the folder "
+            "where the report was made."
+        )
     if changed and not request.accept_changes:
         raise InputError(
-            f"{request.report_file}: {listed(changed)} changed since, or cannot be found from "
-            "here. Go to the folder where the report was made, or give --accept-changes to take "
-            "the inputs as they are now."
+            f"{request.report_file}: {listed(changed)} changed since. Give --accept-changes to "
+            "take the inputs as they are now."
         )
     for path in changed:
         journal.tell(Problem("changed-input", "it has changed since the report", file=path))
     return run_verb(asked, journal)
+
+
+def _request(path: Path, report: Mapping[str, Any]) -> Request:
+    """The request of a report; what is wrong with it is the file's fault."""
+    try:
+        asked = from_data(report["request"])
+    except UsageError as error:
+        raise InputError(f"{path}: the request of this report cannot be run. {error}") from error
+    if isinstance(asked, RerunRequest):
+        raise InputError(f"{path}: a report of rerun cannot be run again.")
+    return asked
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -43,22 +57,29 @@ def _read(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
     except ValueError as error:
         raise InputError(f"{path}: this is not a JSON report of usdhand.") from error
-    if not _is_report(report):
-        raise InputError(
-            f"{path}: this report has no request; only reports of usdhand that have the key "
-            "'request' can be run again."
-        )
+    if why := _why_none(report):
+        raise InputError(f"{path}: this is no report that can be run again: {why}.")
     found: dict[str, Any] = report
     return found
 
 
-def _is_report(value: object) -> bool:
-    return (
-        isinstance(value, dict)
-        and isinstance(value.get("request"), dict)
-        and isinstance(value.get("inputs"), list)
-        and all(isinstance(entry, dict) for entry in value["inputs"])
-    )
+def _why_none(value: object) -> str:
+    """Say why a value is no report of ours, "" where it is one."""
+    if not isinstance(value, dict):
+        return "it is no JSON object"
+    name, _, version = str(value.get("schema", "")).partition("/")
+    if not name.startswith("usdhand."):
+        return "its 'schema' is none of usdhand"
+    if version != str(SCHEMA_VERSION):
+        return (
+            f"its schema is {name}/{version}, this version of usdhand knows {name}/{SCHEMA_VERSION}"
+        )
+    if not isinstance(value.get("request"), dict):
+        return "it has no 'request'"
+    inputs = value.get("inputs")
+    if not isinstance(inputs, list) or not all(isinstance(entry, dict) for entry in inputs):
+        return "it has no list of 'inputs'"
+    return ""
 
 
 def _changed(asked: Request, request: RerunRequest) -> Request:
@@ -74,7 +95,10 @@ def _changed(asked: Request, request: RerunRequest) -> Request:
     return replace(asked, **{name: value for name, value in wanted.items() if name in own})
 
 
-def _changes(report: Mapping[str, Any]) -> list[str]:
-    """Paths of inputs whose content is not what it was."""
-    entries = [(str(entry.get("path")), entry.get("sha256")) for entry in report["inputs"]]
-    return [path for path, content in entries if file_hash(Path(path)) != content]
+def _changes(report: Mapping[str, Any]) -> tuple[list[str], list[str]]:
+    """Paths of inputs whose content is not what it was, and of those that are not there."""
+    before = {str(entry.get("path")): entry.get("sha256") for entry in report["inputs"]}
+    now = {path: file_hash(Path(path)) for path in before}
+    missing = [path for path in before if before[path] is not None and now[path] is None]
+    changed = [path for path in before if before[path] != now[path] and path not in missing]
+    return changed, missing

@@ -11,22 +11,36 @@ from usdhand.formats.schema import schema_folder
 from usdhand.requests.json_schema import request_schema
 from usdhand.requests.schema import SchemaRequest
 from usdhand.requests.verbs import request_class
-from usdhand.verbs.outcome import Journal, Outcome
+from usdhand.verbs.outcome import FAILURE, Journal, Outcome
+
+CHOICES = ("of_report", "of_request", "of_failure", "of_edits")
 
 
 def run(request: SchemaRequest, journal: Journal) -> Outcome:
     """Say where the USD schema is, or print a JSON schema."""
     del journal
+    asked = [f"--{name.replace('_', '-')}" for name in CHOICES if getattr(request, name)]
+    if len(asked) > 1:
+        raise UsageError(f"{' and '.join(asked)} exclude each other: give one of them.")
+    found = _found(request)
+    folder = str(schema_folder()) if found is None else None
+    return Outcome(
+        request,
+        (),
+        lambda: {"folder": folder, "json_schema": found},
+        lambda *_: folder or json.dumps(found, indent=2),
+    )
+
+
+def _found(request: SchemaRequest) -> dict[str, Any] | None:
+    """The JSON schema that is asked for, None where the USD one is."""
     if request.of_request is not None:
-        found = request_schema(request_class(request.of_request))
-    elif request.of_report is not None:
-        found = report_schema(request.of_report)
-    elif request.of_edits:
-        found = _schema_file("edits") or {}
-    else:
-        folder = str(schema_folder())
-        return Outcome(request, (), lambda: {"folder": folder}, lambda *_: folder)
-    return Outcome(request, (), lambda: found, lambda *_: json.dumps(found, indent=2))
+        return request_schema(request_class(request.of_request))
+    if request.of_report is not None:
+        return report_schema(request.of_report)
+    if request.of_failure:
+        return failure_schema()
+    return _schema_file("edits") if request.of_edits else None
 
 
 def report_schema(verb: str) -> dict[str, Any]:
@@ -41,6 +55,13 @@ def report_schema(verb: str) -> dict[str, Any]:
     schema = _schema_file(verb.split()[0])
     if schema is None:
         raise UsageError(f"'{verb}' makes no report.")
+    return schema
+
+
+def failure_schema() -> dict[str, Any]:
+    """Return the JSON schema of reports of runs that failed as a whole."""
+    schema = _schema_file(FAILURE)
+    assert schema is not None
     return schema
 
 

@@ -19,7 +19,7 @@ from usdhand.problems import Problem
 
 # Bytes from which the compiled parser is used: loading it first takes a second.
 LARGE, LARGE_ONCE_LOADED = 40_000_000, 4_000_000
-HEAD = 1 << 20  # bytes that hold nearly every hierarchy
+HEAD_BYTES = 1 << 20  # bytes that hold nearly every hierarchy
 
 _MOTION = re.compile(rb"\bMOTION\b", re.IGNORECASE)
 
@@ -47,7 +47,7 @@ def parse_file(path: Path) -> BvhFile:
     """
     try:
         with path.open("rb") as file:
-            data = file.read(HEAD)
+            data = file.read(HEAD_BYTES)
             if not _MOTION.search(data):
                 data += file.read()
             if is_wide(data):

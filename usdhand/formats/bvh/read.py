@@ -198,7 +198,8 @@ def _channel_problems(
         if any(kind == "scale" for kind, _ in channels)
     ]
     if scaled:
-        message = f"{len(scaled)} joints have scale channels, e.g. '{scaled[0]}': not read"
+        have = counted(len(scaled), "joint has", "joints have")
+        message = f"{have} scale channels, not read: {listed(scaled)}"
         yield Problem("scale-channels", message)
     if near_zero:
         done = (

@@ -17,7 +17,7 @@ from usdhand.motion import rotations as rot
 from usdhand.motion.kinematics import scaled_joints
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import to_y_up
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted
 
 MOVES_CM = 5e-4  # a joint that is farther from its place at the bind pose gets position channels
 TURNS_DEG = 1e-3  # an end that turns more is a joint
@@ -218,8 +218,8 @@ def _problems(clip: Clip, layout: _Layout, renamed: int) -> Iterator[Problem]:
     scaled = scaled_joints(clip)
     if scaled:
         message = (
-            f"BVH has no scales: those of {len(scaled)} joints move the joints below them, but do "
-            "not make anything larger"
+            f"BVH has no scales: those of {counted(len(scaled), 'joint')} move the joints below, "
+            "but do not make anything larger"
         )
         yield Problem("scales", message, clip.skeleton.joints[min(scaled)])
     roots = int((parents < 0).sum())
@@ -229,12 +229,14 @@ def _problems(clip: Clip, layout: _Layout, renamed: int) -> Iterator[Problem]:
     moving = [j for j in sorted(layout.with_positions) if parents[j] >= 0]
     if moving:
         message = (
-            f"{len(moving)} joints below the root move in their parents and have position "
-            "channels, which some programs do not read"
+            "joints below the root move in their parents and have position channels, which some "
+            f"programs do not read: {counted(len(moving), 'joint')}"
         )
         yield Problem("moving-joints", message, clip.skeleton.joints[moving[0]], "note")
     if renamed:
-        message = f"{renamed} joints are renamed: names in the file have no spaces and are unique"
+        message = "names in the file have no spaces and are unique; renamed: " + counted(
+            renamed, "joint"
+        )
         yield Problem("renamed-joints", message, severity="note")
     if abs(clip.start) > 1e-9:
         message = f"BVH has no start time: the clip began at {clip.start:g} s and begins at 0"

@@ -26,13 +26,13 @@ from typing import Any
 
 MAX_FRAMES = 200_000  # nearly an hour at 60 fps
 BLANK_FACTOR = 10.0  # a take that lasts this many times longer than its keys is not meant
-HELD: list[list[Any]] = []
+ALIVE: list[list[Any]] = []
 
 
 def held(items: Iterable[Any]) -> list[Any]:
     """Elements of a ufbx list, never to be freed."""
     found = list(items)
-    HELD.append(found)
+    ALIVE.append(found)
     return found
 
 

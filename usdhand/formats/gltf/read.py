@@ -20,7 +20,7 @@ from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.motion import Clip, Origin, Skeleton
 from usdhand.motion.timing import DEFAULT_FPS, MOST_FRAMES, Timing, find_timing
 from usdhand.motion.transforms import compose_trs, to_y_up
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted
 
 CM_PER_UNIT = 100.0
 MOST_VALUES = 20_000_000  # frames times joints: 55 minutes of 100 joints at 60 fps
@@ -126,8 +126,8 @@ def _animated(scene: _GltfScene) -> Clip:
     )
     if not curves:
         raise InputError(
-            f"{document.path}: the animation '{name}' moves none of the {len(nodes)} joints of "
-            f"'{scene.character.names[0]}'."
+            f"{document.path}: the animation '{name}' moves none of the "
+            f"{counted(len(nodes), 'joint')} of '{scene.character.names[0]}'."
         )
     timing = find_timing([curve.times for curve in curves.values()])
     if timing.count > MOST_FRAMES:
@@ -137,7 +137,8 @@ def _animated(scene: _GltfScene) -> Clip:
         )
     if timing.count * len(nodes) > MOST_VALUES:
         raise InputError(
-            f"{document.path}: {timing.count} frames of {len(nodes)} joints are not plausible. "
+            f"{document.path}: {timing.count} frames of {counted(len(nodes), 'joint')} are not "
+            "plausible. "
             "Check the key times."
         )
     motion = Motion(curves, timing)
@@ -184,7 +185,8 @@ def _skeleton(scene: _GltfScene) -> tuple[Skeleton, tuple[Problem, ...]]:
     bind[:, :3, 3] *= space.unit
     bones = scene.humanoid.bones
     if bones:
-        message = f"{len(bones)} joints are named as bones of a {scene.humanoid.version} humanoid"
+        named = counted(len(bones), "joint is named as a bone", "joints are named as bones")
+        message = f"{named} of a {scene.humanoid.version} humanoid"
         problems += (Problem("humanoid", message, severity="note"),)
     aliases = tuple(bones.get(node, "") for node in nodes) if bones else ()
     return Skeleton(_joint_paths(scene), parents, bind, rest, aliases), (*odd, *problems)

@@ -23,7 +23,7 @@ from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import decompose_trs
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted
 from usdhand.version import __version__
 
 METRES = 0.01  # of a centimetre
@@ -33,7 +33,7 @@ WORST_TIME = 0.02  # frames: how far single precision may move a key
 
 FLOAT = 5126
 INVERSE_BIND, MOTION = 0, 1  # buffer views
-KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 
 def write_clip(clip: Clip, path: Path) -> tuple[Problem, ...]:
@@ -96,7 +96,7 @@ def write_clip(clip: Clip, path: Path) -> tuple[Problem, ...]:
 def _left_out(clip: Clip) -> Iterator[Problem]:
     if clip.shears:
         joint = clip.skeleton.joints[min(clip.shears)]
-        message = f"glTF has no shear: that of {len(clip.shears)} joints is left out"
+        message = f"glTF has no shear: that of {counted(len(clip.shears), 'joint')} is left out"
         yield Problem("sheared", message, joint)
 
 
@@ -119,7 +119,7 @@ class _Numbers:
             "byteOffset": holder["byteLength"],
             "componentType": FLOAT,
             "count": len(single),
-            "type": KINDS[single.shape[1]],
+            "type": TYPES[single.shape[1]],
         }
         if bounds:  # glTF wants those of key times
             accessor |= {"min": single.min(axis=0).tolist(), "max": single.max(axis=0).tolist()}

@@ -24,7 +24,7 @@ from usdhand.motion.resample import at_frames
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import time_codes
 from usdhand.motion.transforms import ROUNDED, compose_trs, rigid
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted
 
 VARIANT_SET = "fingers"
 AT_REST = 1e-6  # of the largest number in a rest transform: below, a joint has not left it
@@ -146,7 +146,9 @@ def animation_losses(layer: Sdf.Layer, path: Sdf.Path, clip: Clip) -> Iterator[P
     joints = clip.skeleton.joints
     sheared = [j for j in sorted(clip.shears) if joints[j] in listed]
     if sheared:
-        message = f"a SkelAnimation has no shear: that of {len(sheared)} joints that move is lost"
+        message = (
+            f"a SkelAnimation has no shear: that of {counted(len(sheared), 'moving joint')} is lost"
+        )
         yield Problem("sheared", message, joints[sheared[0]])
     rounded = [
         j
@@ -158,7 +160,7 @@ def animation_losses(layer: Sdf.Layer, path: Sdf.Path, clip: Clip) -> Iterator[P
     if rounded:
         message = (
             "a SkelAnimation has scales in half precision: that of "
-            f"{len(rounded)} joints is rounded, and what is below them moves"
+            f"{counted(len(rounded), 'joint')} is rounded, and what is below them moves"
         )
         yield Problem("rounded-scale", message, joints[rounded[0]])
 

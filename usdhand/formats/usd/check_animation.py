@@ -13,9 +13,9 @@ from pxr import Usd, UsdSkel
 from usdhand.formats.usd.bindings import binding_prim, unapplied_bindings
 from usdhand.formats.usd.curves import Tracks, type_problems
 from usdhand.motion import leaf_name
+from usdhand.motion.rotations import UNIT_TOLERANCE
 from usdhand.problems import Problem, listed
 
-UNIT_TOLERANCE = 1e-3
 TIME_TOLERANCE = 1e-6  # time codes
 
 

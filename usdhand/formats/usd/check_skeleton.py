@@ -14,7 +14,7 @@ from usdhand.formats.usd.names import illegal_names, legal_name, order_problems
 from usdhand.formats.usd.poses import MISPLACED_BIND_CM
 from usdhand.formats.usd.world import world_problems
 from usdhand.motion import leaf_name, parents_from_paths
-from usdhand.problems import Problem, Severity, listed
+from usdhand.problems import Problem, Severity, counted, listed
 
 # What may be wrong with a pose: it is not there, has another length, or no usable matrices.
 POSE_PROBLEMS = {
@@ -86,10 +86,10 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
             message = f"there are no {name} transforms, without which UsdSkel and Blender cannot"
             yield replace(missing, message=f"{message} pose it")
         elif len(matrices) != len(joints):
-            message = f"{len(matrices)} {name} transforms for {len(joints)} joints"
+            message = f"{len(matrices)} {name} transforms for {counted(len(joints), 'joint')}"
             yield replace(other_length, message=message)
         elif singular := [joints[int(j)] for j in np.flatnonzero(~_usable(matrices))]:
-            message = f"{len(singular)} {name} transforms are singular or not numbers"
+            message = f"singular {name} transforms, or such that are no numbers"
             yield replace(bad, message=f"{message}: {listed(singular)}")
         else:
             poses[name] = matrices
@@ -100,7 +100,8 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
         if len(unplaced):
             yield Problem(
                 "identity-bind",
-                f"{len(unplaced)} joints have an identity bind transform (Maya writes that where "
+                f"{counted(len(unplaced), 'joint has', 'joints have')} an identity bind transform "
+                "(Maya writes that where "
                 f"no skin uses a joint): {listed([leaf_name(joints[j]) for j in unplaced])}",
                 where,
                 "warning",

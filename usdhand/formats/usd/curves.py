@@ -22,7 +22,7 @@ from usdhand.motion.timing import (
 )
 from usdhand.problems import Problem
 
-UNIT_TOLERANCE = 1e-6  # of a squared norm: what rounding to float32 leaves
+SQUARED_UNIT_TOLERANCE = 1e-6  # of a squared norm: what rounding to float32 leaves
 SHORTEST = 1e-6  # squared norm below which a quaternion has no direction
 USUAL_FPS = 24.0  # of a stage that counts ticks and does not say its frame rate
 
@@ -122,7 +122,7 @@ def finish_rotations(values: Array, block: slice) -> Fault | None:
     """Bring quaternions to unit length and to the half space of the sample before, in place."""
     rows = values[block]
     norms = _dot(rows, rows)
-    if not (np.abs(norms - 1.0) <= UNIT_TOLERANCE).all():
+    if not (np.abs(norms - 1.0) <= SQUARED_UNIT_TOLERANCE).all():
         if not np.isfinite(norms).all():
             return ~np.isfinite(norms), "not-a-number"
         if norms.min() < SHORTEST:

@@ -35,7 +35,7 @@ from usdhand.formats.usd.damage import damage_refused, refuses_damage, usd_diagn
 from usdhand.formats.usd.stage import Character, compose, open_stage
 from usdhand.formats.usd.write import describe_layer, save_layer
 from usdhand.motion import Clip
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted
 
 VERSION = 1
 ROOT = "/Library"
@@ -138,7 +138,7 @@ def read_library(path: str | Path) -> MotionLibrary:
             damaged.append(Problem("damaged", str(error), file=str(prim.GetPath())))
     if damaged and not clips:
         raise InputError(
-            f"{path}: none of its {len(damaged)} clips can be used ({damaged[0].file}: "
+            f"{path}: none of its {counted(len(damaged), 'clip')} can be used ({damaged[0].file}: "
             f"{damaged[0].message}); "
             f"'usdhand library build CLIP... -o {path} --rebuild' builds it again."
         )

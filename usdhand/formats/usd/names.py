@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Sdf, Usd, Vt
 
 from usdhand.motion import Skeleton, parents_from_paths
-from usdhand.problems import Problem, listed
+from usdhand.problems import Problem, counted, listed
 
 ORIGINALS, ALIASES = "usdhand:jointNames", "usdhand:jointAliases"
 
@@ -41,8 +41,9 @@ def name_problems(joints: Sequence[str], where: str) -> Iterator[Problem]:
     absolute = [joint for joint in joints if joint.startswith("/")]
     if absolute:
         message = (
-            f"{len(absolute)} joints have absolute paths, e.g. '{absolute[0]}': UsdSkel takes "
-            "them, other programs may not; 'usdhand convert' makes them relative"
+            f"{counted(len(absolute), 'joint has', 'joints have')} an absolute path, "
+            f"e.g. '{absolute[0]}': UsdSkel takes that, other programs may not; 'usdhand convert' "
+            "makes it relative"
         )
         yield Problem("absolute-joints", message, where)
 
@@ -52,9 +53,12 @@ def order_problems(joints: Sequence[str], where: str) -> Iterator[Problem]:
     parents = parents_from_paths(joints)
     late = [joints[int(j)] for j in np.flatnonzero(parents > np.arange(len(joints)))]
     if late:
+        those = counted(
+            len(late), "joint is listed before its parent", "joints are listed before their parents"
+        )
         message = (
-            f"{len(late)} joints are listed before their parents, so UsdSkel refuses the "
-            f"skeleton: {listed(late)}. 'usdhand convert' puts them in order"
+            f"{those}, so UsdSkel refuses the skeleton: {listed(late)}. 'usdhand convert' puts "
+            "them in order"
         )
         yield Problem("joint-order", message, where)
 

@@ -14,7 +14,7 @@ from usdhand.formats.usd.world import World
 from usdhand.motion import Skeleton
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import affine, local_matrices, unit
-from usdhand.problems import Problem, listed
+from usdhand.problems import Problem, counted, listed
 
 MISPLACED_BIND_CM = 1.0
 
@@ -131,7 +131,7 @@ def _repair_unskinned(
     if not repaired:
         return skeleton, ()
     message = (
-        f"{len(repaired)} joints have an identity bind transform (no skin uses them) and are "
-        "placed by the first frame"
+        f"{counted(len(repaired), 'joint has', 'joints have')} an identity bind transform (used "
+        "by no skin) and placed by the first frame"
     )
     return replace(skeleton, bind=bind), (Problem("identity-bind", message, listed(repaired)),)

@@ -35,7 +35,7 @@ from usdhand.motion.plausible import check_clip
 from usdhand.motion.rotations import Array
 from usdhand.motion.timing import FASTEST_FPS, SLOWEST_FPS
 from usdhand.motion.transforms import compose_trs, decompose, with_even_signs
-from usdhand.problems import Problem
+from usdhand.problems import Problem, counted
 
 LATEST_TIME_CODE = 1e12
 
@@ -197,7 +197,8 @@ def _targets(
     where = f"{character.path}: {animation.GetPath()}"
     if not (targets >= 0).any():
         raise InputError(
-            f"{where} animates none of the {len(joints)} joints of {character.skeleton.GetPath()}."
+            f"{where} animates none of the {counted(len(joints), 'joint')} of "
+            f"{character.skeleton.GetPath()}."
         )
     if not animation.GetRotationsAttr().HasAuthoredValue():
         raise InputError(f"{where} has no rotations.")

@@ -28,7 +28,7 @@ from usdhand.formats.usd.stage import (
 )
 from usdhand.formats.usd.write import free_child, write_motion
 from usdhand.motion import Clip
-from usdhand.motion.rotations import Array
+from usdhand.motion.rotations import UNIT_TOLERANCE, Array
 from usdhand.problems import Problem
 from usdhand.reduce.limits import Limits
 from usdhand.reduce.method import Reduction
@@ -36,7 +36,6 @@ from usdhand.reduce.rig import Kind, ReducedRig, Relation, evaluation_order
 
 RIG_NAME = "HandRig"
 LARGEST = 1e6  # degrees, or anything else a rig counts: more cannot be meant
-UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from usdhand.anatomy.hand import digit_joints
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion.kinematics import scaled_joints
 from usdhand.motion.rotations import Array
+from usdhand.problems import counted
 from usdhand.report.preview.pack import Pack
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def lane_data(lane: Lane, pack: Pack, max_frames: int) -> dict[str, Any]:
             f"({clip.fps / every:.3g} a second) and interpolates between them"
         )
     if clip.shears:
-        notes.append(f"the page does not show the shear of {len(clip.shears)} joints")
+        notes.append(f"the page does not show the shear of {counted(len(clip.shears), 'joint')}")
     drawn = _drawn(clip.skeleton, lane.hands)
     positions = forward_kinematics(clip).positions[:: max(every, len(clip) // 600)]
     data: dict[str, Any] = {

@@ -40,7 +40,7 @@ MODULES = {
 # Relative addresses mean nothing in a page of one file.
 RENAMED = {'"./three.core.min.js"': '"three-core"'}
 # Characters that a data address can hold as they are, inside a JSON text inside HTML.
-READABLE = "!$&'()*+,-./:;=?@_~ []{}|^`>"
+UNESCAPED = "!$&'()*+,-./:;=?@_~ []{}|^`>"
 
 
 def page(title: str, data: dict[str, Any], figures: Sequence[dict[str, str]] = ()) -> str:
@@ -115,7 +115,7 @@ def _module(file: str) -> str:
     text = _text(file)
     for old, new in RENAMED.items():
         text = text.replace(old, new)
-    return "data:text/javascript;charset=utf-8," + quote(text, safe=READABLE)
+    return "data:text/javascript;charset=utf-8," + quote(text, safe=UNESCAPED)
 
 
 def _text(file: str) -> str:
