@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
+import usdhand.formats.usd  # noqa: F401  before any test loads USD itself
+
 if TYPE_CHECKING:
     from builders.shared_work import SharedWork, Shell
 

@@ -15,7 +15,7 @@ from oracles.composition import assert_composes_alike
 from pxr import Tf, Usd
 
 from usdhand.formats.usd.composed import variant_places
-from usdhand.formats.usd.stage import usd_diagnostics
+from usdhand.formats.usd.stage import one_thread, usd_diagnostics
 from usdhand.formats.usd.write import save_flat
 
 SUFFIXES = ("usda", "usdc", "usdz")
@@ -25,7 +25,7 @@ LENIENT = {"suppress_health_check": list(HealthCheck), "print_blob": True}
 
 def check_one(data: st.DataObject) -> None:
     suffix = data.draw(st.sampled_from(SUFFIXES))
-    with TemporaryDirectory() as folder, usd_diagnostics():
+    with TemporaryDirectory() as folder, usd_diagnostics(), one_thread():
         source = random_stage(Path(folder), data.draw)
         target = Path(folder, f"out.{suffix}")
         try:
@@ -45,7 +45,7 @@ def check_variants(before: Usd.Stage, after: Usd.Stage) -> None:
     choices = [
         (str(prim.GetPath()), name, variant)
         for prim, name in variant_places(before)
-        if not prim.IsInPrototype() and not prim.IsAbstract()
+        if not prim.IsInstanceProxy() and not prim.IsAbstract()
         for variant in prim.GetVariantSets().GetVariantSet(name).GetVariantNames()
     ]
     for path, name, variant in choices:

@@ -148,7 +148,7 @@ def selections(stage: Usd.Stage) -> list[tuple[Sdf.Path, str, str]]:
     return [
         (prim.GetPath(), name, variant)
         for prim, name in variant_places(stage)
-        if not prim.IsInPrototype() and not str(prim.GetPath()).startswith("/Embedded")
+        if not prim.IsInstanceProxy() and not str(prim.GetPath()).startswith("/Embedded")
         for variant in prim.GetVariantSets().GetVariantSet(name).GetVariantNames()
     ]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ def first_difference(one: Sdf.Layer, other: Sdf.Layer, variants: bool) -> str | 
             return " with ".join([found, *(f"variant {v} of {name}" for _, name, v in chosen)])
         if not variants:
             break
-        for prim, name in _variant_sets([stages[0].GetPrimAtPath(top)]):
+        for prim, name in _variant_sets(stages[0].GetPrimAtPath(top), Usd.PrimAllPrimsPredicate):
             if (prim.GetPath(), name) in seen:
                 continue
             seen.add((prim.GetPath(), name))
@@ -53,15 +53,19 @@ def first_difference(one: Sdf.Layer, other: Sdf.Layer, variants: bool) -> str | 
 
 
 def variant_places(stage: Usd.Stage) -> list[tuple[Usd.Prim, str]]:
-    """Prims of a stage and the names of their variant sets, those of prototypes included."""
-    return _variant_sets([stage.GetPseudoRoot(), *stage.GetPrototypes()])
+    """Prims of a stage and the names of their variant sets; what instances share comes once."""
+    everything = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+    found: dict[tuple[Sdf.Path, str], tuple[Usd.Prim, str]] = {}
+    for prim, name in _variant_sets(stage.GetPseudoRoot(), everything):
+        shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        found.setdefault((shared.GetPath(), name), (prim, name))
+    return list(found.values())
 
 
-def _variant_sets(roots: Sequence[Usd.Prim]) -> list[tuple[Usd.Prim, str]]:
+def _variant_sets(root: Usd.Prim, predicate: Any) -> list[tuple[Usd.Prim, str]]:
     return [
         (prim, name)
-        for root in roots
-        for prim in Usd.PrimRange(root, Usd.PrimAllPrimsPredicate)
+        for prim in Usd.PrimRange(root, predicate)
         for name in prim.GetVariantSets().GetNames()
     ]
 
@@ -76,8 +80,8 @@ def _difference(a: Usd.Prim, b: Usd.Prim) -> str | None:
     """First path below two prims where they differ."""
     ranges = [Usd.PrimRange(prim, Usd.TraverseInstanceProxies()) for prim in (a, b)]
     prims, others = ({prim.GetPath(): prim for prim in each} for each in ranges)
-    for path in prims.keys() ^ others.keys():
-        return str(path)
+    if differing := prims.keys() ^ others.keys():
+        return str(min(differing))
     for path, prim in prims.items():
         if found := _prim_difference(prim, others[path]):
             return found

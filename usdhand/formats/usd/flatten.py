@@ -7,7 +7,7 @@ from pxr import Sdf, Usd
 from usdhand.formats.usd.composed import first_difference, variant_places
 from usdhand.formats.usd.damage import usd_diagnostics
 from usdhand.formats.usd.embed import EMBEDDED, NotEmbeddedError, embedded
-from usdhand.formats.usd.stage import compose
+from usdhand.formats.usd.stage import compose, one_thread
 from usdhand.problems import Problem
 
 
@@ -20,7 +20,7 @@ def flat_layer(stage: Usd.Stage) -> tuple[Sdf.Layer, tuple[Problem, ...]]:
     is selected; otherwise the values count for more than the variants, and it is said.
     """
     names = [f"{prim.GetPath()} {name}" for prim, name in variant_places(stage)]
-    with usd_diagnostics():
+    with usd_diagnostics(), one_thread():
         try:
             flat, lost = (_embedded(stage), ()) if names else _flattened(stage)
         except NotEmbeddedError as reason:

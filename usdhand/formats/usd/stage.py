@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from pickle import PicklingError
 
-from pxr import Sdf, Tf, Usd, UsdSkel
+from pxr import Sdf, Tf, Usd, UsdSkel, Work
 
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.suffixes import USD_SUFFIXES
@@ -71,7 +73,23 @@ def compose(root: str | Sdf.Layer, load: Usd.Stage.InitialLoadSet = Usd.Stage.Lo
     """
     if isinstance(root, str):
         opening(root)
-    return Usd.Stage.Open(root, load)
+    with one_thread():
+        return Usd.Stage.Open(root, load)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let USD compose in one thread.
+
+    A prototype is made of the instance that comes first, and targets that lead out of instances
+    depend on which it is: several threads would give a stage other targets from time to time.
+    """
+    limit = Work.GetConcurrencyLimit()
+    Work.SetConcurrencyLimit(1)
+    try:
+        yield
+    finally:
+        Work.SetConcurrencyLimit(limit)
 
 
 @refuses_damage
