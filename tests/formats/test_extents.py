@@ -13,7 +13,9 @@ from pxr import Kind, Sdf, Usd, UsdGeom, UsdSkel
 
 from usdhand.formats.usd.extents import author_extents
 
-FULL = REPOSITORY / "samples" / "conversations" / "talk_01_full.usdc"
+FULL, BODY = (
+    REPOSITORY / "samples" / "conversations" / f"talk_01_{kind}.usdc" for kind in ("full", "body")
+)
 WRONG = [(-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)]
 
 
@@ -62,6 +64,25 @@ def test_results_have_the_extents_of_their_motion(tmp_path: Path) -> None:
         target = tmp_path / f"{options[0]}.usdc"
         run(options[0], FULL, "-o", target, *options[1:])
         assert_right(Usd.Stage.Open(str(target)), "/Ada")
+
+
+@pytest.mark.parametrize("options", [[], ["--flatten"]])
+def test_alternatives_have_the_extents_of_the_one_that_is_selected(
+    options: list[str], gestures_library: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "filled.usdc"
+    run("fill", BODY, "--library", gestures_library, "-o", target, "--alternatives", 3, *options)
+    stage = Usd.Stage.Open(str(target))
+    stage.SetEditTarget(stage.GetSessionLayer())
+    [animation] = [p for p in stage.Traverse() if p.GetName() == "HandMotion"]
+    fingers = animation.GetVariantSet("fingers")
+    for name in fingers.GetVariantNames():
+        fingers.SetVariantSelection(name)
+        for path in ("/Ada", "/Ada/Skeleton"):
+            boundable = UsdGeom.Boundable(stage.GetPrimAtPath(path))
+            for time in (1.0, 120.0, 300.0):
+                right = UsdGeom.Boundable.ComputeExtentFromPlugins(boundable, time)
+                assert np.allclose(boundable.ComputeExtent(time), right, atol=1e-3)
 
 
 def test_characters_of_a_library_are_below_groups(tmp_path: Path) -> None:

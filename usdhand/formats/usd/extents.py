@@ -16,26 +16,51 @@ def author_extents(layer: Sdf.Layer, path: Sdf.Path) -> None:
     They are what UsdSkel computes at each time of the motion. Where there is none, none is made:
     programs compute it then.
     """
-    with usd_diagnostics():
-        stage = compose(layer)
-    top = stage.GetPrimAtPath(path)
-    root = UsdSkel.Root(top) if top else None
-    if not root:
+    stage = _composed(layer)
+    found = _root_and_skeletons(stage, path)
+    if not found:
         return
-    predicate = Usd.TraverseInstanceProxies()
-    cache = UsdSkel.Cache()
-    cache.Populate(root, predicate)
-    skeletons = [p for p in Usd.PrimRange(top, predicate) if p.IsA(UsdSkel.Skeleton)]
+    top, *skeletons = found
+    root, cache = UsdSkel.Root(top), UsdSkel.Cache()
+    cache.Populate(root, Usd.TraverseInstanceProxies())
     times: set[float] = set()
     for prim in skeletons:
         query = cache.GetSkelQuery(UsdSkel.Skeleton(prim))
         if query and query.GetAnimQuery():
             times.update(query.GetAnimQuery().GetJointTransformTimeSamples())
-    for prim in (top, *skeletons):
-        has_one = UsdGeom.Boundable(prim).GetExtentAttr().HasAuthoredValue()
-        if has_one and not prim.IsInstanceProxy():
-            box = _box_of_root(root, cache) if prim == top else _computed(prim)
-            _author(layer, prim.GetPath(), sorted(times), box)
+    for prim in filter(_has_extent, found):
+        box = _box_of_root(root, cache) if prim == top else _computed(prim)
+        _author(layer, prim.GetPath(), sorted(times), box)
+
+
+def withhold_extents(layer: Sdf.Layer, path: Sdf.Path) -> None:
+    """Take back the extents of a SkelRoot and Skeletons below it whose motion is in variants.
+
+    They are above the animation, so no variant of it can give them; programs compute them.
+    """
+    stage = _composed(layer)
+    for prim in filter(_has_extent, _root_and_skeletons(stage, path)):
+        spec = _extent(layer, prim.GetPath())
+        spec.ClearInfo("timeSamples")
+        spec.default = Sdf.ValueBlock()
+
+
+def _composed(layer: Sdf.Layer) -> Usd.Stage:
+    with usd_diagnostics():
+        return compose(layer)
+
+
+def _root_and_skeletons(stage: Usd.Stage, path: Sdf.Path) -> list[Usd.Prim]:
+    top = stage.GetPrimAtPath(path)
+    if not top or not UsdSkel.Root(top):
+        return []
+    below = Usd.PrimRange(top, Usd.TraverseInstanceProxies())
+    return [top, *(prim for prim in below if prim.IsA(UsdSkel.Skeleton))]
+
+
+def _has_extent(prim: Usd.Prim) -> bool:
+    authored = UsdGeom.Boundable(prim).GetExtentAttr().HasAuthoredValue()
+    return bool(authored) and not prim.IsInstanceProxy()
 
 
 Box = Callable[[Usd.TimeCode], Vt.Vec3fArray]
@@ -74,12 +99,16 @@ def _computed(prim: Usd.Prim) -> Box:
 
 
 def _author(layer: Sdf.Layer, path: Sdf.Path, times: list[float], box: Box) -> None:
-    spec = layer.GetAttributeAtPath(path.AppendProperty("extent")) or Sdf.AttributeSpec(
-        Sdf.CreatePrimInLayer(layer, path), "extent", Sdf.ValueTypeNames.Float3Array
-    )
+    spec = _extent(layer, path)
     boxes = {time: box(Usd.TimeCode(time)) for time in times}
     with Sdf.ChangeBlock():
         spec.ClearInfo("timeSamples")
         spec.default = boxes[times[0]] if times else box(Usd.TimeCode.Default())
         for time, values in boxes.items() if len(times) > 1 else ():
             layer.SetTimeSample(spec.path, time, values)
+
+
+def _extent(layer: Sdf.Layer, path: Sdf.Path) -> Sdf.AttributeSpec:
+    return layer.GetAttributeAtPath(path.AppendProperty("extent")) or Sdf.AttributeSpec(
+        Sdf.CreatePrimInLayer(layer, path), "extent", Sdf.ValueTypeNames.Float3Array
+    )

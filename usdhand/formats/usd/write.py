@@ -22,7 +22,7 @@ from usdhand.formats.usd.bindings import bind_animation
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.curves import Tracks
 from usdhand.formats.usd.damage import refuses_damage, usd_diagnostics
-from usdhand.formats.usd.extents import author_extents
+from usdhand.formats.usd.extents import author_extents, withhold_extents
 from usdhand.formats.usd.flatten import flat_layer
 from usdhand.formats.usd.stage import (
     Character,
@@ -129,7 +129,7 @@ def write_motion(
             extend_time(layer, times)
         if author is not None:
             author(layer, root)
-    author_extents(layer, root)
+    (withhold_extents if variants else author_extents)(layer, root)
     lost = () if variants else tuple(animation_losses(layer, animation, clips[""]))
     saved = save_layer(layer, output, flatten=flatten, allow_outside=allow_outside)
     return (*shared, *lost, *saved)
