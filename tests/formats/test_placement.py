@@ -88,9 +88,8 @@ SOURCES: list[Callable[[Path], Path]] = [
 ]  # fmt: skip
 
 
-def world(path: Path) -> dict[str, np.ndarray]:
+def world(stage: Usd.Stage) -> dict[str, np.ndarray]:
     """World transforms of all joints and other prims, by UsdSkel and UsdGeom."""
-    stage = Usd.Stage.Open(str(path))
     found = {}
     for time in (1.0, 6.5):
         cache = UsdGeom.XformCache(time)
@@ -106,6 +105,11 @@ def world(path: Path) -> dict[str, np.ndarray]:
 
 
 def assert_placed(before: Path, after: Path, turn: float, scale: float) -> None:
+    stages = (Usd.Stage.Open(str(path)) for path in (before, after))
+    assert_stage_placed(*stages, turn, scale)
+
+
+def assert_stage_placed(before: Usd.Stage, after: Usd.Stage, turn: float, scale: float) -> None:
     placing = Gf.Matrix4d().SetRotate(Gf.Rotation((1, 0, 0), turn))
     placing *= Gf.Matrix4d().SetScale(scale)
     one, other = world(before), world(after)
@@ -152,3 +156,100 @@ def test_domes_that_follow_the_up_axis_are_turned_once(tmp_path: Path) -> None:
     after = Usd.Stage.Open(str(target))
     assert after.GetAttributeAtPath("/Dome.poleAxis").Get() == "Y"
     assert_placed(path, target, 90.0, 1.0)
+
+
+def in_variants(
+    stage: Usd.Stage, place: str, name: str, changes: dict[str, Callable[[], object]]
+) -> None:
+    """Give a prim a variant set, with what is authored in each variant; the last is selected."""
+    variants = stage.GetPrimAtPath(place).GetVariantSets().AddVariantSet(name)
+    for variant, change in changes.items():
+        variants.AddVariant(variant)
+        variants.SetVariantSelection(variant)
+        with variants.GetVariantEditContext():
+            change()
+
+
+def seats(folder: Path) -> Path:
+    """Variants with transforms of their own, one of which resets the stack; one has none."""
+    path = stages.character(folder / "in.usda")
+    stage = stages.edited(path)
+    hero = UsdGeom.Xformable(stage.GetPrimAtPath(stages.ROOT))
+
+    def lift() -> None:
+        hero.AddTranslateOp(opSuffix="lift").Set((0.0, 30.0, 5.0))
+
+    def turn() -> None:
+        hero.AddRotateXYZOp().Set((0.0, 90.0, 30.0))
+        hero.SetResetXformStack(True)
+
+    in_variants(stage, stages.ROOT, "seat", {"low": lambda: None, "turned": turn, "high": lift})
+    stage.Save()
+    return with_company(path)
+
+
+def seats_of_another_file(folder: Path) -> Path:
+    (folder / "there").mkdir()
+    return stages.referencing(folder / "in.usda", seats(folder / "there"))
+
+
+def props(folder: Path) -> Path:
+    """A Scope whose variants bring other prims, and a light that follows the up axis."""
+    path = scope(folder)
+    stage = stages.edited(path)
+    in_variants(
+        stage,
+        "/World",
+        "prop",
+        {
+            "ball": lambda: (
+                UsdGeom.Sphere.Define(stage, "/World/Ball").AddTranslateOp().Set((1, 2, 3))
+            ),
+            "box": lambda: UsdGeom.Cube.Define(stage, "/World/Box/Inner"),
+            "none": lambda: None,
+            "sky": lambda: stage.DefinePrim("/World/Sky", "DomeLight_1"),
+        },
+    )
+    stage.Save()
+    return path
+
+
+@pytest.mark.parametrize("source", [seats, seats_of_another_file, props])
+@pytest.mark.parametrize("suffix", ["usda", "usdz"])
+def test_each_variant_is_placed(
+    source: Callable[[Path], Path], suffix: str, tmp_path: Path
+) -> None:
+    path, turned, both = source(tmp_path), *(tmp_path / f"{name}.{suffix}" for name in "tb")
+    run("convert", path, "-o", turned, "--up", "Z")
+    run("convert", turned, "-o", both, "--scale", 2)
+    for target, scale in ((turned, 1.0), (both, 2.0)):
+        before, after = (Usd.Stage.Open(str(each)) for each in (path, target))
+        for stage in (before, after):
+            stage.SetEditTarget(stage.GetSessionLayer())
+        [(place, name)] = [
+            (str(prim.GetPath()), prim.GetVariantSets().GetNames()[0])
+            for prim in before.Traverse()
+            if prim.HasVariantSets()
+        ]
+        for variant in before.GetPrimAtPath(place).GetVariantSet(name).GetVariantNames():
+            for stage in (before, after):
+                stage.GetPrimAtPath(place).GetVariantSet(name).SetVariantSelection(variant)
+            assert_stage_placed(before, after, 90.0, scale)
+
+
+def test_variants_that_depend_on_each_other_are_refused(tmp_path: Path) -> None:
+    path = seats(tmp_path)
+    stage = stages.edited(path)
+    hero = UsdGeom.Xformable(stage.GetPrimAtPath(stages.ROOT))
+    in_variants(
+        stage,
+        stages.ROOT,
+        "size",
+        {"own": lambda: None, "big": lambda: hero.AddScaleOp(opSuffix="size").Set((2, 2, 2))},
+    )
+    stage.Save()
+    target = tmp_path / "out.usda"
+    said = run("convert", path, "-o", target, "--up", "Z", code=2).output
+    assert "/Hero cannot be turned or scaled with variant" in said
+    assert not target.exists()
+    run("convert", path, "-o", target)

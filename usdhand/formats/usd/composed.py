@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -24,22 +25,29 @@ def first_difference(one: Sdf.Layer, other: Sdf.Layer, variants: bool) -> str | 
     Compared are the prims, what they are, and all values of their attributes at their own times,
     targets and connections; as selected, and if ``variants`` for each other variant as well.
     """
-    stages = compose(one), compose(other)  # with session layers of their own
-    for stage in stages:
-        stage.SetEditTarget(stage.GetSessionLayer())
+    a, b = compose(one), compose(other)  # with session layers of their own
+    for chosen in selections(a) if variants else [()]:
+        _select(b, chosen)
+        top = chosen[-1][0] if chosen else Sdf.Path.absoluteRootPath
+        found = _difference(a.GetPrimAtPath(top), b.GetPrimAtPath(top))
+        if found is not None:
+            return " with ".join([found, *(f"variant {v} of {name}" for _, name, v in chosen)])
+    return None
+
+
+def selections(stage: Usd.Stage) -> Iterator[tuple[Selection, ...]]:
+    """Select each variant of a stage in its session layer, and those that only come up by others.
+
+    First there is nothing selected anew, which is ``()``; last it is so again.
+    """
     seen: set[tuple[Sdf.Path, str]] = set()
     pending: list[tuple[Selection, ...]] = [()]
     while pending:
         chosen = pending.pop()
-        for stage in stages:
-            _select(stage, chosen)
+        _select(stage, chosen)
+        yield chosen
         top = chosen[-1][0] if chosen else Sdf.Path.absoluteRootPath
-        found = _difference(*(stage.GetPrimAtPath(top) for stage in stages))
-        if found is not None:
-            return " with ".join([found, *(f"variant {v} of {name}" for _, name, v in chosen)])
-        if not variants:
-            break
-        for prim, name in _variant_sets(stages[0].GetPrimAtPath(top), Usd.PrimAllPrimsPredicate):
+        for prim, name in _variant_sets(stage.GetPrimAtPath(top), Usd.PrimAllPrimsPredicate):
             if (prim.GetPath(), name) in seen:
                 continue
             seen.add((prim.GetPath(), name))
@@ -49,7 +57,17 @@ def first_difference(one: Sdf.Layer, other: Sdf.Layer, variants: bool) -> str | 
                 for variant in there.GetVariantNames()
                 if variant != there.GetVariantSelection()
             ]
-    return None
+    _select(stage, ())
+
+
+@contextmanager
+def selected(stage: Usd.Stage, chosen: Iterable[Selection]) -> Iterator[None]:
+    """Select variants in a stage's session layer for a while."""
+    _select(stage, chosen)
+    try:
+        yield
+    finally:
+        _select(stage, ())
 
 
 def variant_places(stage: Usd.Stage) -> list[tuple[Usd.Prim, str]]:
@@ -72,8 +90,9 @@ def _variant_sets(root: Usd.Prim, predicate: Any) -> list[tuple[Usd.Prim, str]]:
 
 def _select(stage: Usd.Stage, chosen: Iterable[Selection]) -> None:
     stage.GetSessionLayer().Clear()
-    for path, name, variant in chosen:
-        stage.GetPrimAtPath(path).GetVariantSets().SetSelection(name, variant)
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        for path, name, variant in chosen:
+            stage.GetPrimAtPath(path).GetVariantSets().SetSelection(name, variant)
 
 
 def _difference(a: Usd.Prim, b: Usd.Prim) -> str | None:

@@ -78,7 +78,7 @@ def placed(character: Character, placement: StageEdit) -> Character:
             moved = recounted_code(source.GetMetadata(field), old, new or old) + placement.offset
             layer.pseudoRoot.SetInfo(field, moved)
     stage = compose(layer)
-    turn_and_scale(stage, placement.up, placement.scale)
+    turn_and_scale(stage, placement.up, placement.scale, character.path)
     skeleton = stage.GetPrimAtPath(character.skeleton.GetPath())
     return replace(character, stage=stage, skeleton=skeleton, animation=bound_animation(skeleton))
 

@@ -3,28 +3,48 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
+import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+
+from usdhand.errors import UsageError
+from usdhand.formats.usd.composed import Selection, selected, selections
+from usdhand.motion.rotations import Array
 
 RESET = "!resetXformStack!"
 TURN, SCALE = "xformOp:rotateX:usdhandUpAxis", "xformOp:scale:usdhandScale"
+EXACT = 1e-9
+Worlds = dict[Sdf.Path, Array]
 
 
 @dataclass(frozen=True)
 class Ops:
-    """The transform ops that a prim is to have: their order, and values of those that are new."""
+    """The transform ops that a prim is to have: their order, and values of those that are new.
+
+    A light that follows the up axis is to have the pole axis ``pole`` instead, if there is one.
+    """
 
     order: tuple[str, ...]
     values: Mapping[str, float] = field(default_factory=dict)
+    pole: str = ""
 
 
-def turn_and_scale(stage: Usd.Stage, up: str | None, scale: float) -> None:
+Plan = dict[Sdf.Path, Ops]
+
+
+def turn_and_scale(stage: Usd.Stage, up: str | None, scale: float, of: Path) -> None:
     """Turn a stage's up axis to ``up``, "Y" or "Z", and scale all that is on it.
 
     Transforms on the uppermost prims that have any do it, and on those that reset the transform
     stack, so that skeletons, meshes, cameras and lights are each placed once in the world.
+
+    Raises
+    ------
+    UsageError
+        about the file ``of``, if not all variants can be placed.
     """
     old = str(UsdGeom.GetStageUpAxis(stage))
     turn = 0.0
@@ -34,23 +54,110 @@ def turn_and_scale(stage: Usd.Stage, up: str | None, scale: float) -> None:
     if turn == 0.0 and scale == 1.0:
         return
     # All is planned before anything is authored, since prims may refer to each other.
-    wanted = {
+    alone = list(selections(stage))
+    plans: dict[tuple[Selection, ...], Plan] = {}
+    before: dict[tuple[Selection, ...], Worlds] = {}
+    for chosen in (*alone, *_pairs(alone)):
+        with selected(stage, chosen):
+            plans[chosen], before[chosen] = _planned(stage, turn, scale, old), _worlds(stage)
+    base = plans[()]
+    varying = _varying(base, {chosen[0]: plans[chosen] for chosen in alone if len(chosen) == 1})
+    inside = {path for paths in varying.values() for path in paths}
+    _carry_out(stage, {path: ops for path, ops in base.items() if path not in inside})
+    for (place, name), paths in varying.items():
+        chosen_now = stage.GetPrimAtPath(place).GetVariantSet(name).GetVariantSelection()
+        for variant in stage.GetPrimAtPath(place).GetVariantSet(name).GetVariantNames():
+            selection = (place, name, variant)
+            plan = base if variant == chosen_now else plans[(selection,)]
+            with selected(stage, [selection]):
+                target = stage.GetPrimAtPath(place).GetVariantSet(name).GetVariantEditTarget()
+                with Usd.EditContext(stage, target):
+                    _carry_out(stage, {path: plan[path] for path in paths if path in plan})
+    placing = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d.XAxis(), turn))
+    placing *= Gf.Matrix4d().SetScale(scale)
+    for chosen, plan in plans.items() if len(plans) > 1 else ():
+        wanted = {path: matrix @ np.array(placing) for path, matrix in before[chosen].items()}
+        with selected(stage, chosen):
+            if place := _misplaced(stage, plan, wanted):
+                raise UsageError(_refusal(of, place, chosen))
+
+
+def _pairs(chosen: Iterable[tuple[Selection, ...]]) -> list[tuple[Selection, ...]]:
+    """Variants of two sets that may bear on one prim."""
+    alone = [each[0] for each in chosen if len(each) == 1]
+    return [
+        (a, b)
+        for a, b in itertools.combinations(alone, 2)
+        if a[:2] != b[:2] and (a[0].HasPrefix(b[0]) or b[0].HasPrefix(a[0]))
+    ]
+
+
+def _planned(stage: Usd.Stage, turn: float, scale: float, old: str) -> Plan:
+    plan = {
         prim.GetPath(): _placed(prim, turn, scale) if top else Ops(_order(prim))
         for prim, top in _xformables(stage)
     }
-    domes = [prim.GetPath() for prim in _every(stage) if _follows_up_axis(prim)]
-    for path in (*(path for path, ops in wanted.items() if ops.values), *(domes if turn else ())):
-        _open_instances(stage, path)
-    for path, ops in wanted.items():
+    for prim in filter(_follows_up_axis, _every(stage)) if turn else ():
+        plan[prim.GetPath()] = replace(plan[prim.GetPath()], pole=old)
+    return plan
+
+
+def _varying(
+    base: Plan, plans: Mapping[Selection, Plan]
+) -> dict[tuple[Sdf.Path, str], list[Sdf.Path]]:
+    """Prims whose ops depend on a variant set, for each of these that has any."""
+    found: dict[tuple[Sdf.Path, str], dict[Sdf.Path, None]] = {}
+    for (place, name, _), plan in plans.items():
+        for path in (*base, *plan):
+            if path.HasPrefix(place) and base.get(path) != plan.get(path):
+                found.setdefault((place, name), {})[path] = None
+    return {key: list(paths) for key, paths in found.items()}
+
+
+def _carry_out(stage: Usd.Stage, plan: Plan) -> None:
+    for path, ops in plan.items():
+        if ops.values or ops.pole:
+            _open_instances(stage, path)
+    for path, ops in plan.items():
         if ops.values:
             _author(stage.GetPrimAtPath(path), ops)
-    for path in domes if turn else ():
-        stage.GetPrimAtPath(path).GetAttribute("poleAxis").Set(old)
+        if ops.pole:
+            stage.GetPrimAtPath(path).GetAttribute("poleAxis").Set(ops.pole)
     # What refers to a prim that is placed now may be below another one.
-    for path, ops in wanted.items():
+    for path, ops in plan.items():
         if not ops.values and _order(stage.GetPrimAtPath(path)) != ops.order:
             _open_instances(stage, path)
             _author(stage.GetPrimAtPath(path), ops)
+
+
+def _worlds(stage: Usd.Stage) -> Worlds:
+    """World transforms (4, 4) of all prims that have one, at the earliest time."""
+    cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+    return {
+        prim.GetPath(): np.array(cache.GetLocalToWorldTransform(prim))
+        for prim, _ in _xformables(stage)
+    }
+
+
+def _misplaced(stage: Usd.Stage, plan: Plan, wanted: Worlds) -> Sdf.Path | None:
+    """First prim that has not the ops of a plan, or that they do not place where it is wanted."""
+    worlds = _worlds(stage)
+    for path, matrix in wanted.items():
+        close = EXACT * max(1.0, float(np.abs(matrix).max()))
+        if path not in worlds or not np.allclose(worlds[path], matrix, EXACT, close):
+            return path
+        if _order(stage.GetPrimAtPath(path)) != plan[path].order:
+            return path
+    return None
+
+
+def _refusal(of: Path, path: Sdf.Path, chosen: Iterable[Selection]) -> str:
+    names = " and ".join(f"variant '{variant}' of '{name}'" for _, name, variant in chosen)
+    return (
+        f"{of}: {path} cannot be turned or scaled with {names or 'no variant'} selected, since its transforms depend "
+        "on several variant sets. Convert without --up and --scale, or flatten the file first "
+        "with the variants that are wanted."
+    )
 
 
 def _every(stage: Usd.Stage) -> Iterator[Usd.Prim]:
@@ -118,7 +225,8 @@ def _author(prim: Usd.Prim, ops: Ops) -> None:
 
 def _open_instances(stage: Usd.Stage, path: Sdf.Path) -> None:
     """Make a prim editable: nothing can be authored inside an instance."""
-    for above in path.GetPrefixes()[:-1]:
-        prim = stage.GetPrimAtPath(above)
-        if prim.IsInstance():
-            prim.SetInstanceable(False)
+    with Usd.EditContext(stage, stage.GetRootLayer()):
+        for above in path.GetPrefixes()[:-1]:
+            prim = stage.GetPrimAtPath(above)
+            if prim.IsInstance():
+                prim.SetInstanceable(False)
