@@ -77,7 +77,10 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         conventions,
         conventions.conventions[0],
         usdhand.Grafted(clip, {"left": (LONG,) * 20}),
-        usdhand.FillSettings(metric=LONG, segmentation=usdhand.Segmentation(shortest=0.1)),
+        usdhand.FillSettings(
+            metric=usdhand.Metric(LONG, {"wrist": 1.0}),
+            segmentation=usdhand.Segmentation(shortest=0.1),
+        ),
         usdhand.Metric(LONG, {"wrist": 1.0, "forearm": 2.0, "hips_palm": 3.0, "upper_arm": 4.0}),
         usdhand.Segmentation(speed=3.0),
         usdhand.SpliceSettings(pins=(usdhand.Pin(0.0, 0.0, name=LONG),) * 99),

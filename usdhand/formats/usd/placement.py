@@ -155,8 +155,8 @@ def _refusal(of: Path, path: Sdf.Path, chosen: Iterable[Selection]) -> str:
     names = " and ".join(f"variant '{variant}' of '{name}'" for _, name, variant in chosen)
     return (
         f"{of}: {path} cannot be turned or scaled with {names or 'no variant'} selected, since "
-        "its transforms depend on several variant sets. Convert without --up and --scale, or flatten the file first "
-        "with the variants that are wanted."
+        "its transforms depend on several variant sets. Convert without --up and --scale, or "
+        "flatten the file first with the variants that are wanted."
     )
 
 
