@@ -41,6 +41,10 @@ def few(tmp_path_factory: pytest.TempPathFactory, show: Path) -> Path:
     return path
 
 
+def test_a_rig_alone_is_right_without_a_skeleton(show: Path) -> None:
+    assert usdhand.check_file(show) == ()
+
+
 def test_one_file_with_relations_alone(show: Path, tmp_path: Path) -> None:
     stage = Usd.Stage.Open(str(show))
     [prim] = stage.GetPseudoRoot().GetChildren()

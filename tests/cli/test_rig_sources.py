@@ -56,6 +56,21 @@ def test_nothing_is_said_while_nothing_changes(layered: tuple[Path, Path], tmp_p
     assert not [p for p in expand(layered[1]).problems if p.code == "changed-source"]
 
 
+def test_takes_without_poses_are_compared_too(tmp_path: Path) -> None:
+    """UsdSkel shows no motion without bind and rest pose."""
+    clip, rig = tmp_path / "clip.usdc", tmp_path / "rig.usda"
+    copied(clip)
+    stage = Usd.Stage.Open(str(clip))
+    for name in ("bindTransforms", "restTransforms"):
+        stage.GetPrimAtPath("/Ada/Skeleton").RemoveProperty(name)
+    stage.Save()
+    run("reduce", clip, "-o", rig, "-q")
+    assert "changed" not in run("expand", rig, "-o", tmp_path / "out.usda").output
+    lifted(clip)
+    said = run("expand", rig, "-o", tmp_path / "old.usda").output
+    assert re.search(r"'Hips' moves\s+differently", said)
+
+
 def test_a_body_that_moved_is_told_and_refreshed(
     layered: tuple[Path, Path], tmp_path: Path
 ) -> None:

@@ -11,7 +11,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdValidation
 from usdhand.formats.usd.check_animation import animation_findings
 from usdhand.formats.usd.check_skeleton import skeleton_findings
 from usdhand.formats.usd.damage import refuses_damage
-from usdhand.formats.usd.rig import rig_findings
+from usdhand.formats.usd.rig import rig_findings, rig_prims
 from usdhand.formats.usd.stage import choose_skeleton, find_skeletons, open_stage
 from usdhand.problems import Problem, Severity
 
@@ -54,7 +54,7 @@ def _stage_findings(path: Path, stage: Usd.Stage, skel: str | None) -> Iterator[
     yield from rate_findings(stage)
     yield from rig_findings(stage, path)
     skeletons = find_skeletons(stage)
-    if not skeletons:
+    if not skeletons and not any(rig_prims(stage)):  # a rig may be fitted without a character
         yield Problem("no-skeleton", "there is no UsdSkel skeleton", str(path), "warning")
     for skeleton in [choose_skeleton(path, skeletons, skel)] if skel else skeletons:
         yield from skeleton_findings(skeleton)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +11,10 @@ from pxr import Sdf, Usd, UsdSkel
 
 from usdhand.errors import UsdHandError
 from usdhand.formats.hashing import file_hash
+from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.stage import Character, find_character
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import compose_trs
 
 SAME = 1e-5  # of the largest number in joint matrices: what differs less is the same motion
 
@@ -98,16 +100,36 @@ def _first_difference(then: Character, now: Character, ignored: Collection[str])
         return "it moves"
     compared = [i for i, joint in enumerate(joints) if joint not in ignored]
     places = [old.index(joints[i]) for i in compared]
-    for time in times[1].tolist() or [0.0]:
-        a, b = (_locals(query, time) for query in queries)
-        if a is None or b is None:
-            return None
+    for time, a, b in _poses(then, now, queries, times[1].tolist() or [0.0]):
         off = np.abs(a[places] - b[compared]).max(axis=(1, 2), initial=0.0)
         if len(off) and off.max() > SAME * max(1.0, float(np.abs(b[compared]).max())):
             return (
                 f"'{joints[compared[int(off.argmax())]]}' moves differently at time code {time:g}"
             )
     return None
+
+
+def _poses(
+    then: Character,
+    now: Character,
+    queries: Sequence[UsdSkel.SkeletonQuery],
+    times: Sequence[float],
+) -> Iterator[tuple[float, Array, Array]]:
+    """Joint-to-parent matrices (joints, 4, 4) of two characters at each time.
+
+    UsdSkel has none for a skeleton without a rest pose; ours are compared then.
+    """
+    if all(query.ComputeJointLocalTransforms(times[0]) for query in queries):
+        for time in times:
+            a, b = (np.array(query.ComputeJointLocalTransforms(time)) for query in queries)
+            yield time, a, b
+        return
+    clips = [clip_from_character(character) for character in (then, now)]
+    for frame in range(min(map(len, clips))):
+        a, b = (
+            compose_trs(c.translations[frame], c.rotations[frame], c.scales[frame]) for c in clips
+        )
+        yield float(clips[1].time_codes[frame]), a, b
 
 
 def _times(skeleton: UsdSkel.SkeletonQuery) -> Array:
@@ -121,9 +143,3 @@ def _query(character: Character) -> UsdSkel.SkeletonQuery:
     if root:
         cache.Populate(root, Usd.TraverseInstanceProxies())
     return cache.GetSkelQuery(UsdSkel.Skeleton(character.skeleton))
-
-
-def _locals(query: UsdSkel.SkeletonQuery, time: float) -> Array | None:
-    """Joint-to-parent matrices (joints, 4, 4), None where UsdSkel has none."""
-    matrices = query.ComputeJointLocalTransforms(time)
-    return None if matrices is None else np.array(matrices)
