@@ -1,75 +1,74 @@
 """Damaged files of every kind through the verbs, in forked children with limits.
 
 usage: python campaign.py [--tries N] [--seed N] [--formats bvh,usda,...] [--keep FOLDER]
-    [--corpus FOLDER] [--minutes M]
+    [--corpus FOLDER] [--minutes M] [--counts FILE]
 
 Of each try, one of these comes: it works, and no value that was written is not finite; it is
 refused in words, and nothing was written; USD crashes, which the program's own guard tells. All
 else is a failure: another error, a crash in a format that is not USD's, 10 s of the processor,
-1 GB more memory.
+1 GB more memory, anything printed past the program's own messages.
 """
 
 from __future__ import annotations
 
 import argparse
 import collections
-import importlib
+import gc
+import json
 import os
 import pickle
 import random
-import re
 import resource
 import select
-import shutil
 import signal
 import struct
 import subprocess
 import sys
 import tempfile
 import time
-import traceback
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+# Children are forked from a process that has done everything once, where no thread may run.
+os.environ |= {"PXR_WORK_THREAD_LIMIT": "1", "OPENBLAS_NUM_THREADS": "1"}
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from builders.report_schemas import judged
+from fuzz.asked import USD, requests
+from fuzz.judged import Result, judge
 from fuzz.mutations import damaged
 
 SECONDS = 10
 STUCK_S = 120.0  # without an answer, on a busy machine
 GROWTH = 1 << 30
-ROUND = 40  # tries a child
-NOT_FINITE = re.compile(rb"(?<![\w.\"])(?:nan|-?inf)(?![\w\"])")
-USD = ("usda", "usdc", "usdz", "rig.usda", "rig.usdc", "library.usdc")
+MOST = 3 << 30  # more is refused by the system, which may end a library without a word
+ROUND = 100  # tries a child
+TURN = 2000  # tries in which every kind has its share
+TOLD_S = 60.0
 SHARES = {
-    "bvh": 20,
-    "usda": 20,
-    "usdc": 20,
-    "usdz": 6,
-    "glb": 10,
-    "gltf": 10,
-    "fbx": 1,
+    "bvh": 18,
+    "usda": 18,
+    "usdc": 18,
+    "usdz": 8,
+    "glb": 8,
+    "gltf": 8,
+    "fbx": 2,
     "rig.usda": 4,
     "rig.usdc": 4,
-    "library.usdc": 4,
-    "fill.json": 4,
-    "splice.json": 4,
+    "library.usdc": 3,
+    "fill.json": 3,
+    "splice.json": 3,
     "map.toml": 4,
+    "edits.json": 3,
 }
-USED = (
-    *(f"verbs.{verb}" for verb in ("inspect", "convert", "reduce", "preview", "check", "expand")),
-    *(f"verbs.{verb}" for verb in ("library_info", "fill", "rerun")),
-    *(f"formats.{name}" for name in ("bvh.read", "bvh.write", "gltf.read", "gltf.write")),
-    "formats.fbx.read",
-)
+WARMING = ("usdc", "bvh", "glb", "rig.usda", "library.usdc", "fill.json", "map.toml")
 
 
 @dataclass(frozen=True)
 class Try:
     """One damaged file: its kind, and the number that its damage and its verb follow from.
 
-    One that failed before is in a file.
+    One that failed before is in a file, and goes through all verbs.
     """
 
     kind: str
@@ -86,97 +85,18 @@ class Try:
         rng = random.Random(f"{self.kind} {self.number}")
         return damaged((seeds / self.seed).read_bytes(), self.kind.rpartition(".")[2], rng)
 
-
-@dataclass(frozen=True)
-class Result:
-    """What came of a try: "works", "refused", "crashed", or what is wrong."""
-
-    what: str
-    detail: str = ""
-
-    @property
-    def failed(self) -> bool:
-        return self.what not in ("works", "refused", "crashed")
-
-
-def requests(kind: str, file: Path, seeds: Path, number: int) -> list[object]:
-    """What is asked of a damaged file."""
-    from usdhand.requests.check import CheckRequest
-    from usdhand.requests.convert import ConvertRequest
-    from usdhand.requests.expand import ExpandRequest
-    from usdhand.requests.fill import FillRequest
-    from usdhand.requests.inspect import InspectRequest
-    from usdhand.requests.library import LibraryInfoRequest
-    from usdhand.requests.preview import PreviewRequest
-    from usdhand.requests.reduce import ReduceRequest
-    from usdhand.requests.rerun import RerunRequest
-
-    folder, name = file.parent, str(file)
-    if kind.startswith("rig."):
-        return [ExpandRequest(rig=file, output=folder / "out.usda")]
-    if kind.startswith("library."):
-        out = folder / "out.usda"
-        filling = FillRequest(body=seeds / "body.usdc", library=file, output=out, replace=True)
-        return [LibraryInfoRequest(library=file), *([filling] if number % 4 == 0 else [])]
-    if kind.endswith(".json"):
-        shown = str(seeds / ("filled.usdc" if kind == "fill.json" else "spliced.usdc"))
-        page = folder / "out.html"
-        return [
-            PreviewRequest(files=(shown,), reports=(file,), output=page),
-            RerunRequest(report_file=file, output=folder / "out.usda"),
-        ][number % 2 :][:1]
-    if kind == "map.toml":
-        return [InspectRequest(files=(str(seeds / "s.bvh"),), maps=(file,))]
-    onto = seeds / "s.usdc"
-    others: list[object] = [
-        ConvertRequest(files=(name,), output=folder / "out.usda"),
-        ConvertRequest(files=(name,), output=folder / "out.bvh"),
-        ConvertRequest(files=(name,), output=folder / "out.glb"),
-        ConvertRequest(files=(name,), output=folder / "out.usda", onto=onto),
-        ReduceRequest(clips=(name,), output=folder / "out.usda"),
-        PreviewRequest(files=(name,), output=folder / "out.html"),
-    ]
-    if kind in USD:
-        others.append(CheckRequest(files=(name,)))
-    return [InspectRequest(files=(name,)), others[number % len(others)]]
-
-
-def judge(tried: Try, content: bytes, folder: Path, seeds: Path) -> Result:
-    """Do what is asked of a damaged file, and say what came of it."""
-    from usdhand.errors import UsdHandError
-    from usdhand.verbs.run import run
-
-    file = folder / f"t{tried.number}.{tried.kind.rpartition('.')[2]}"
-    file.write_bytes(content)
-    what = Result("refused")
-    try:
-        for request in requests(tried.kind, file, seeds, tried.number):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                try:
-                    code = run(request).exit_code  # type: ignore[arg-type]
-                    what = Result("refused" if code else "works")
-                except UsdHandError as error:
-                    what = Result("refused")
-                    str(error).encode("utf-8", "backslashreplace")
-                    if left := [p.name for p in folder.iterdir() if p != file]:
-                        return Result("left behind", f"{type(request).__name__} {left}: {error}")
-        for path in folder.glob("out.*"):
-            if path.suffix in (".usda", ".bvh") and (found := NOT_FINITE.search(path.read_bytes())):
-                return Result("not finite", f"{path.name} at {found.start()}")
-    except BaseException as error:
-        where = traceback.extract_tb(error.__traceback__)
-        own = [f"{Path(f.filename).name}:{f.lineno}" for f in where if "usdhand" in f.filename]
-        return Result(type(error).__name__, f"{' '.join(own[-3:])} {str(error)[:150]}")
-    finally:
-        for path in folder.iterdir():
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-    return what
+    def result(self, folder: Path, seeds: Path) -> Result:
+        file = folder / f"t{self.number}.{self.kind.rpartition('.')[2]}"
+        content = self.content(seeds)
+        file.write_bytes(content)
+        number = None if self.file is not None else self.number
+        result = judge(requests(self.kind, file, seeds, number), file)
+        return result if file.read_bytes() == content else Result("input changed")
 
 
 def campaign(tries: list[Try], seeds: Path) -> Iterator[tuple[Try, Result]]:
     """Judge all tries in children that die alone."""
-    import_all()
+    warm_up(seeds)
     for start in range(0, len(tries), ROUND):
         left = tries[start : start + ROUND]
         while left:
@@ -187,10 +107,18 @@ def campaign(tries: list[Try], seeds: Path) -> Iterator[tuple[Try, Result]]:
             left = left[done:]
 
 
-def import_all() -> None:
-    """Import what the verbs need before children are forked; no stage is opened here."""
-    for name in USED:
-        importlib.import_module(f"usdhand.{name}")
+def warm_up(seeds: Path) -> None:
+    """Do once what children do, with files that are sound."""
+    with tempfile.TemporaryDirectory() as name, judged():
+        for kind in WARMING:
+            sound = Try(kind, 0, seeds / Try(kind, 0).seed)
+            result = sound.result(Path(name), seeds)
+            next(Path(name).iterdir()).unlink()
+            if result.what not in ("works", "refused"):
+                raise AssertionError(f"a sound {kind} file: {result}")
+    if threads := list(Path("/proc/self/task").iterdir())[1:]:
+        raise AssertionError(f"{len(threads)} threads would be lost in children")
+    gc.freeze()  # so that children share this memory
 
 
 def _child(tries: list[Try], seeds: Path) -> Iterator[Result]:
@@ -199,7 +127,10 @@ def _child(tries: list[Try], seeds: Path) -> Iterator[Result]:
     child = os.fork()
     if not child:
         os.close(reader)
-        _work(tries, seeds, writer)
+        try:
+            _work(tries, seeds, writer)
+        finally:  # whatever happens: what stands behind the fork is the parent's
+            os._exit(1)
     os.close(writer)
     told = 0
     with os.fdopen(reader, "rb") as answers:
@@ -229,18 +160,29 @@ def _work(tries: list[Try], seeds: Path, writer: int) -> None:
     os.dup2(noise.fileno(), 1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # the command line drops it as well
     sys.stderr = sys.stdout
-    size = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_DATA, (size + GROWTH, size + GROWTH))
+    data = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_DATA, (data + MOST, data + MOST))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, judged():
         for tried in tries:
+            before = _most_memory(reset=True)
             signal.setitimer(signal.ITIMER_PROF, SECONDS)
-            result = judge(tried, tried.content(seeds), Path(name), seeds)
+            result = tried.result(Path(name), seeds)
+            next(Path(name).iterdir()).unlink()
+            if not result.failed and (grown := _most_memory() - before) > GROWTH:
+                result = Result("growth", f"{grown >> 20} MB")
             if not result.failed and (said := _noise(noise.fileno())):
                 result = Result("noise", said)
             answer = pickle.dumps(result)
             os.write(writer, struct.pack("<I", len(answer)) + answer)
-    os._exit(0)
+
+
+def _most_memory(reset: bool = False) -> int:
+    """Most bytes that were in memory since the last reset."""
+    if reset:
+        Path("/proc/self/clear_refs").write_text("5")
+    status = Path("/proc/self/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) << 10
 
 
 def _noise(number: int) -> str:
@@ -260,7 +202,7 @@ def planned(count: int, seed: int, kinds: list[str]) -> list[Try]:
     weights = [SHARES[kind] for kind in kinds]
     numbers = range(seed * 10_000_000, seed * 10_000_000 + count)
     drawn = rng.choices(kinds, weights, k=count)
-    rounds = sorted(zip(drawn, numbers, strict=True), key=lambda x: (x[1] // 2000, x[0]))
+    rounds = sorted(zip(drawn, numbers, strict=True), key=lambda x: (x[1] // TURN, x[0]))
     return [Try(kind, number) for kind, number in rounds]
 
 
@@ -273,14 +215,15 @@ def make_seeds(folder: Path) -> None:
     )
 
 
-def report(counts: dict[str, collections.Counter[str]]) -> str:
+def report(counts: dict[str, collections.Counter[str]], seconds: float) -> str:
     """Say how many tries of each kind came to what."""
     whats = sorted({what for kind in counts.values() for what in kind})
     lines = [" ".join([f"{'kind':14}", *(f"{what:>12}" for what in whats), f"{'tries':>8}"])]
     for kind, count in sorted(counts.items()):
         row = [f"{kind:14}", *(f"{count[what]:12}" for what in whats), f"{sum(count.values()):8}"]
         lines.append(" ".join(row))
-    return "\n".join([*lines, f"{sum(sum(count.values()) for count in counts.values())} tries"])
+    total = sum(sum(count.values()) for count in counts.values())
+    return "\n".join([*lines, f"{total} tries, {total / seconds:.1f} a second"])
 
 
 def kept(folder: Path) -> list[Try]:
@@ -307,12 +250,14 @@ def main() -> int:
     parser.add_argument("--corpus", type=Path, help="folder of inputs that failed before, instead")
     parser.add_argument("--keep", type=Path, help="folder for inputs that failed or crashed USD")
     parser.add_argument("--minutes", type=float, default=1e9)
+    parser.add_argument("--counts", type=Path, help="file for the counts as JSON, once a minute")
     given = parser.parse_args()
     counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
-    end, failed = time.monotonic() + 60.0 * given.minutes, 0
+    failed = 0
     with tempfile.TemporaryDirectory() as name:
         seeds = Path(name)
         make_seeds(seeds)
+        begin = told = time.monotonic()
         drawn = planned(given.tries, given.seed, given.formats.split(","))
         for tried, result in campaign(kept(given.corpus) if given.corpus else drawn, seeds):
             counts[tried.kind][result.what] += 1
@@ -321,9 +266,13 @@ def main() -> int:
                 print(tried.kind, tried.number, result.what, result.detail, flush=True)
                 if given.keep:
                     keep(tried, result, given.keep, seeds)
-            if time.monotonic() > end:
+            now = time.monotonic()
+            if given.counts and now > told + TOLD_S:
+                told = now
+                given.counts.write_text(json.dumps(counts | {"seconds": now - begin}))
+            if now > begin + 60.0 * given.minutes:
                 break
-    print(report(counts))
+    print(report(counts, now - begin))
     return bool(failed)
 
 

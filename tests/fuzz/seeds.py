@@ -5,11 +5,15 @@ usage: python seeds.py FOLDER
 
 from __future__ import annotations
 
+import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from builders.every_format import fbx_of
+from builders.in_memory import arrays_of, reordered
 
 import usdhand
 from usdhand.motion import Clip
@@ -35,8 +39,12 @@ finger = ["{side}Hand{digit}1", "{side}Hand{digit}2", "{side}Hand{digit}3"]
 tip = ["{side}Hand{digit}4", "{side}Hand{digit}3_End"]
 hips = "Hips"
 
-[left]
-IndexMCP = "LeftHandIndex1"
+[right]
+wrist = "RightHand"
+IndexMCP = "RightHandIndex1"
+IndexPIP = "RightHandIndex2"
+MiddleMCP = "RightHandMiddle1"
+MiddlePIP = "RightHandMiddle2"
 
 [body]
 hips = "Hips"
@@ -51,9 +59,33 @@ def part(name: str, seconds: float, start: float = 0.5) -> Clip:
     return replace(trim(clip, first, last), source=None, name="s")
 
 
+EDITS = {
+    "schema": "usdhand.edits/1",
+    "splice": {
+        "pins": [
+            {"body": 20, "hand": 21.5, "tolerance": 1, "side": "left"},
+            {"body": 40, "hand": 40},
+        ]
+    },
+}
+# Joints that show every kind of hand: small files are damaged where it matters, and read fast.
+FEW = re.compile("Hips(/Spine.?)*|.*(Right.*|Left(Shoulder|Arm|ForeArm|Hand|Hand(Thumb|Index).))")
+LEG = re.compile(".*(Leg|Foot|Toe)")
+
+
+def few_joints(clip: Clip) -> Clip:
+    """Both arms, a whole hand, and two fingers of the other."""
+    keep: list[int] = []
+    for joint, path in enumerate(clip.skeleton.joints):
+        whole = clip.skeleton.parents[joint] in (-1, *keep)
+        if whole and FEW.fullmatch(path) and not LEG.fullmatch(path):
+            keep.append(joint)
+    return Clip.from_arrays(**reordered(arrays_of(clip), np.array(keep)))
+
+
 def make(folder: Path) -> None:
     """Write all of them."""
-    short = part("gestures/ok_01", 0.1)
+    short = few_joints(part("gestures/ok_01", 0.1))
     for suffix in ("usda", "usdc", "usdz", "bvh", "glb", "gltf"):
         usdhand.write_new(short, folder / f"s.{suffix}")
     fbx_of(short, folder / "s.fbx", {})
@@ -73,6 +105,7 @@ def make(folder: Path) -> None:
     report, out = folder / "splice.json", folder / "spliced.usdc"
     run(SpliceRequest(body=body, hands=clips[0], output=out, report=report))
     (folder / "map.toml").write_text(MAP)
+    (folder / "edits.json").write_text(json.dumps(EDITS, indent=1))
 
 
 if __name__ == "__main__":

@@ -115,13 +115,16 @@ def _controllers_in_order(
     residual = covariance[index[:, :, None], index[:, None, :]]
     own = np.diag(covariance)[free]
     order = np.zeros((d, most), dtype=np.intp)
+    taken = np.zeros((d, k), dtype=bool)
     left = np.empty((d, most + 1))
     left[:, 0] = residual[:, k, k]
     for step in range(most):
         among = residual[:, np.arange(k), np.arange(k)]
         gain = residual[:, :k, k] ** 2 / (np.maximum(among, 0.0) + SAME_SHARE * own + TINY)
-        gain[among <= 2 * SAME_SHARE * own] = -1.0  # chosen already, or told by those
+        gain[among <= 2 * SAME_SHARE * own] = -1.0  # told by those that are chosen
+        gain[taken] = -2.0
         best = gain.argmax(axis=1)
+        taken[rows, best] = True
         order[:, step] = free[best]
         column = residual[rows, :, best]
         pivot = column[rows, best] + SAME_SHARE * own[best] + TINY
