@@ -34,6 +34,7 @@ from pathlib import Path
 os.environ |= {"PXR_WORK_THREAD_LIMIT": "1", "OPENBLAS_NUM_THREADS": "1"}
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from builders.report_schemas import judged
+
 from fuzz.asked import USD, requests
 from fuzz.judged import Result, judge
 from fuzz.mutations import damaged

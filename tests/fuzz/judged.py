@@ -103,9 +103,10 @@ def _in_usd(path: Path) -> Iterator[tuple[str, str]]:
     found: list[tuple[str, str]] = []
     try:
         layer = Sdf.Layer.FindOrOpen(str(path))
-    except Tf.ErrorException:
+        text = layer.ExportToString() if layer else ""
+    except (Tf.ErrorException, UnicodeDecodeError):  # the input's own, or found by whoever reads it
         return
-    if layer and NOT_FINITE.search(layer.ExportToString()):
+    if NOT_FINITE.search(text):
 
         def look(at: Sdf.Path) -> None:
             spec = layer.GetAttributeAtPath(at)

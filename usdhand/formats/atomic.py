@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from usdhand.errors import OutputError
@@ -21,6 +22,7 @@ except ImportError:  # not on this system: what killed programs leave is not rem
 
 PREFIX = ".usdhand."
 LOCK = ".tmp.lock"
+MOST_NAMES = 10_000  # bytes of the names in a lock
 _numbers = itertools.count()
 _tidied: set[Path] = set()
 
@@ -32,18 +34,96 @@ def written_beside(output: Path) -> Iterator[Path]:
     It is removed also when the program is told to end. What is left of a program that was killed is
     removed by the next one that writes to the folder.
     """
-    folder = output.absolute().parent
-    tidy(folder)
-    name = f"{PREFIX}{os.getpid()}.{next(_numbers)}"
-    temporary = output.with_name(f"{name}.tmp{output.suffix}")
+    with _work_on(output) as (start, _):
+        temporary = start.with_name(f"{start.name}{output.suffix}")
+        try:
+            yield temporary
+            _to_disk(temporary)
+            os.replace(temporary, output)  # noqa: PTH105  (atomic on every system)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Paths to write a file and a part of it beside it to.
+
+    Attributes
+    ----------
+    part : the part
+    interim : the file as it refers to ``part``
+    final : the file as it refers to the part by the name that it will have
+    """
+
+    part: Path
+    interim: Path
+    final: Path
+
+    @property
+    def spare(self) -> Path:
+        """The part once more, to be renamed."""
+        return self.part.with_name(f"{self.part.stem}.spare{self.part.suffix}")
+
+    @classmethod
+    def at(cls, start: Path, output: Path, part: Path) -> Pair:
+        """The paths that begin with ``start``."""
+        return cls(
+            start.with_name(f"{start.name}.part{part.suffix}"),
+            start.with_name(f"{start.name}{output.suffix}"),
+            start.with_name(f"{start.name}.final{output.suffix}"),
+        )
+
+    def finish(self, output: Path, part: Path) -> None:
+        """Give the part its name if the file is there; this can be done again at any point."""
+        if self.interim.exists() or not self.final.exists():
+            return
+        if self.spare.exists():
+            os.replace(self.spare, part)  # noqa: PTH105
+        os.replace(self.final, output)  # noqa: PTH105
+
+
+@contextmanager
+def pair_written_beside(output: Path, part: Path) -> Iterator[Pair]:
+    """Like `written_beside`, for a file that refers to a part of it in the same folder.
+
+    Two files cannot be replaced at once. So the new file refers to a part of another name first:
+    whenever the program ends, the old file has its old part, and the new one its new part. What
+    is left to be done then, the next program that writes to the folder does.
+    """
+    with _work_on(output) as (start, lock):
+        pair = Pair.at(start, output, part)
+        try:
+            yield pair
+            for path in (pair.part, pair.interim, pair.final):
+                _to_disk(path)
+            _same_file(pair.part, pair.spare)
+            lock.write_text(f"{output.name}\n{part.name}\n", encoding="utf-8")
+            _to_disk(lock)
+            os.replace(pair.interim, output)  # noqa: PTH105
+        finally:
+            pair.finish(output, part)
+            for path in (pair.interim, pair.final, pair.spare, pair.part):
+                path.unlink(missing_ok=True)
+
+
+def _same_file(source: Path, target: Path) -> None:
+    """Give a file another name; where a drive has one name a file, a copy."""
     try:
-        with _ended_by_exception(), _locked(output.with_name(f"{name}{LOCK}")):
-            try:
-                yield temporary
-                _to_disk(temporary)
-                os.replace(temporary, output)  # noqa: PTH105  (atomic on every system)
-            finally:
-                temporary.unlink(missing_ok=True)
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+        _to_disk(target)
+
+
+@contextmanager
+def _work_on(output: Path) -> Iterator[tuple[Path, Path]]:
+    """The start of paths for temporary files in the output's folder, and a lock on them."""
+    tidy(output.absolute().parent)
+    start = output.with_name(f"{PREFIX}{os.getpid()}.{next(_numbers)}.tmp")
+    lock = start.with_name(f"{start.name}.lock")
+    try:
+        with ended_by_exception(), _locked(lock):
+            yield start, lock
     except OSError as error:
         raise OutputError(f"{output}: cannot be written ({error.strerror or error}).") from error
 
@@ -57,10 +137,20 @@ def tidy(folder: Path) -> None:
         try:
             with lock.open("rb") as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                for path in folder.glob(f"{lock.name.removesuffix('.lock')}*"):
+                start = lock.with_suffix("")
+                _finish(start, file.read(MOST_NAMES))
+                for path in folder.glob(f"{start.name}*"):
                     shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
         except OSError:  # its program is at work, or it is not ours to remove
             continue
+
+
+def _finish(start: Path, names: bytes) -> None:
+    """Do what was left to be done of a pair; ``names`` are those of its files."""
+    names_of = os.fsdecode(names).splitlines()
+    if len(names_of) == 2 and all(Path(name).name == name for name in names_of):
+        output, part = (start.with_name(name) for name in names_of)
+        Pair.at(start, output, part).finish(output, part)
 
 
 @contextmanager
@@ -98,7 +188,7 @@ def ending_signals() -> list[signal.Signals]:
 
 
 @contextmanager
-def _ended_by_exception() -> Iterator[None]:
+def ended_by_exception() -> Iterator[None]:
     """Turn SIGTERM and SIGHUP into an exception, so that what was begun is cleaned up."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -1,9 +1,22 @@
-"""Relative paths from one file to another that hold by every way to their folders."""
+"""Paths of files that belong together: relative ones that hold by every way, and pairs."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+
+MOTION_SUFFIX = ".motion.usdc"
+
+
+def motion_crate(layer: Path) -> Path:
+    """Where the motion of an ascii layer is kept."""
+    return layer.with_name(f"{layer.stem}{MOTION_SUFFIX}")
+
+
+def written_files(output: Path, *, flatten: bool = False) -> list[Path]:
+    """All files that a result may consist of."""
+    beside = output.suffix.lower() == ".usda" and not flatten
+    return [output, *([motion_crate(output)] if beside else [])]
 
 
 def relative_path(target: Path, folder: Path) -> str | None:

@@ -75,9 +75,10 @@ class Edits:
 class ConvertRequest(Request):
     """Convert motion between USD, BVH, glTF (also VRM) and FBX (read only).
 
-    A converted USD file is complete in itself. If the input is USD, everything else is kept, such
-    as meshes, materials and cameras. With --onto the fingers go to another character, whatever its
-    names, axes and proportions. What a file does not state is guessed, with a note.
+    A converted USD file needs no other; only a .usda has its motion in NAME.motion.usdc beside it.
+    If the input is USD, everything else is kept, such as meshes, materials and cameras. With --onto
+    the fingers go to another character, whatever its names, axes and proportions. What a file does
+    not state is guessed, with a note.
 
     \b
     Examples:
@@ -110,6 +111,9 @@ class ConvertRequest(Request):
     reading: Reading = settings(Reading())
     onto_skel: str | None = shared.skel("Skeleton of the character to put fingers on.")
     maps: tuple[Path, ...] = shared.maps()
+    flatten: bool = option(
+        "Write a .usda as one file, without a crate beside it for its motion.", default=False
+    )
     allow_outside: bool = shared.allow_outside()
     report: Path | None = shared.report()
     dry_run: bool = shared.dry_run()

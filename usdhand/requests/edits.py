@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from usdhand.errors import InputError
+from usdhand.inputs import read_json
 
 SCHEMA = "usdhand.edits/1"
 _PIN_KEYS = {"body", "hand", "tolerance", "side"}
@@ -22,10 +23,10 @@ def read_pins(path: Path) -> tuple[str, ...]:
         if it is no such file; the message says what is wrong, and at which pin.
     """
     try:
-        edits = json.loads(path.read_text(encoding="utf-8"))
+        edits = read_json(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}).") from error
-    except (RecursionError, ValueError) as error:
+    except ValueError as error:
         raise InputError(f"{path}: no JSON ({error}).") from error
     if not isinstance(edits, dict) or edits.get("schema") != SCHEMA:
         raise InputError(f'{path}: not a file of edits: it has no "schema": "{SCHEMA}".')

@@ -29,7 +29,10 @@ def dry_run() -> Any:
 
 def flatten() -> Any:
     """``--flatten``: one file."""
-    return option("Write one file instead of a layer over the input.", default=False)
+    return option(
+        "Write one file instead of a layer over the input; of a .usda, its motion included.",
+        default=False,
+    )
 
 
 def allow_outside() -> Any:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from usdhand.anatomy import SIDES, Hands, Side
 from usdhand.errors import HandNotFoundError, UsageError
-from usdhand.formats.output import check_output
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import written_files
 from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.convert import write_made
@@ -85,8 +86,10 @@ def write_clip(
     """
     output = Path(output)
     if clip.source is None:
-        check_output(output, [p for p in (clip.origin.path, *inputs) if p], force, USD_SUFFIXES)
-        return write_made(clip, output)
+        outputs = written_files(output, flatten=flatten)
+        given = [p for p in (clip.origin.path, *inputs) if p]
+        check_outputs(outputs, given, force, USD_SUFFIXES)
+        return write_made(clip, output, flatten=flatten)
     changed = [j for f in find_hands(clip, conventions).frames.values() for j in f.links.moving]
     character = character_under(clip)
     return write_motion(

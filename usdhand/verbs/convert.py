@@ -20,9 +20,8 @@ from usdhand.formats.files import (
     read_character,
     write_other,
 )
-from usdhand.formats.output import (
-    check_output,
-)
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import written_files
 from usdhand.formats.reading import DEFAULT, Reading
 from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES, WRITABLE
@@ -85,6 +84,7 @@ def convert(
     onto: str | Path | None = None,
     onto_reading: Reading = DEFAULT,
     conventions: Conventions | None = None,
+    flatten: bool = False,
     allow_outside: bool = False,
     force: bool = False,
     dry_run: bool = False,
@@ -94,6 +94,7 @@ def convert(
     Parameters
     ----------
     onto : a character that gets the fingers of ``path``, and is written instead of it
+    flatten : write one file also where it is ascii with much motion, see `write_new`
     allow_outside : pack files from outside the input's folder into a .usdz, too
 
     Raises
@@ -109,7 +110,7 @@ def convert(
     """
     edits, output = edits or Edits(), Path(output)
     inputs = [Path(path), *([Path(onto)] if onto else [])]
-    check_output(output, inputs, force, WRITABLE)
+    check_outputs(written_files(output, flatten=flatten), inputs, force, WRITABLE)
     _check_up(output, edits.up or "Y")
     lost: tuple[Problem, ...] = ()
     source, animated = read_any(path, reading=reading)
@@ -136,6 +137,7 @@ def convert(
                 clip,
                 output,
                 edited=edited,
+                flatten=flatten,
                 allow_outside=allow_outside,
                 force=force,
                 inputs=inputs,
@@ -146,7 +148,7 @@ def convert(
             clip = starting_at(clip, edits.start)
         if not dry_run:
             up = edits.up or "Y"
-            lost += write_new(clip, output, up=up, animated=animated, force=force)
+            lost += write_new(clip, output, up=up, animated=animated, flatten=flatten, force=force)
     return Converted(clip, source, animated, lost)
 
 
@@ -174,6 +176,7 @@ def write_new(
     *,
     up: Literal["Y", "Z"] = "Y",
     animated: bool = True,
+    flatten: bool = False,
     force: bool = False,
 ) -> tuple[Problem, ...]:
     """Write a clip as a file of its own, and return what its format could not keep.
@@ -182,6 +185,8 @@ def write_new(
     ----------
     up : up axis of the file
     animated : False for a character at its bind pose
+    flatten : write one file; else the motion of a .usda goes to a crate beside it,
+        ``NAME.motion.usdc``, if it is more than a few frames
 
     Raises
     ------
@@ -192,10 +197,11 @@ def write_new(
     """
     output = Path(output)
     suffix = output.suffix.lower()
-    check_output(output, [p for p in [clip.origin.path] if p], force, WRITABLE)
+    given = [p for p in [clip.origin.path] if p]
+    check_outputs(written_files(output, flatten=flatten), given, force, WRITABLE)
     _check_up(output, up)
     if suffix in USD_SUFFIXES:
-        return write_made(clip, output, up=up, animated=animated)
+        return write_made(clip, output, up=up, animated=animated, flatten=flatten)
     with written_beside(output) as temporary:
         return write_other(clip, temporary, suffix, up)
 
@@ -338,6 +344,7 @@ def _converted(job: Job, request: ConvertRequest, conventions: Conventions | Non
         onto=request.onto,
         onto_reading=Reading(skel=request.onto_skel),
         conventions=conventions,
+        flatten=request.flatten,
         allow_outside=request.allow_outside,
         force=request.force,
         dry_run=request.dry_run,

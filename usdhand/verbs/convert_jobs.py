@@ -9,7 +9,8 @@ from pathlib import Path
 
 from usdhand.errors import UsageError, UsdHandError
 from usdhand.formats.files import animation_names
-from usdhand.formats.output import check_folder, check_output, check_outputs, make_folder
+from usdhand.formats.output import check_folder, check_outputs, make_folder
+from usdhand.formats.paths import written_files
 from usdhand.formats.reading import Reading
 from usdhand.formats.suffixes import WRITABLE
 from usdhand.requests.convert import ConvertRequest
@@ -38,7 +39,8 @@ def jobs_of(
             raise UsageError(f"--to {request.to} and -o {output} contradict each other.")
         if len(paths) > 1:
             raise UsageError(f"{len(paths)} inputs need --out-dir DIR instead of -o.")
-        check_output(output, paths, request.force, WRITABLE)
+        outputs = written_files(output, flatten=request.flatten)
+        check_outputs(outputs, paths, request.force, WRITABLE)
         return [Job(paths[0], request.reading, output)], 0
     if folder is None or output is not None:
         raise UsageError("Give either -o OUTPUT or --out-dir DIR.")
@@ -61,7 +63,8 @@ def jobs_of(
     if double := next((target for target, count in counts.items() if count > 1), None):
         raise UsageError(f"Two results would both be {double}; convert them to several folders.")
     make_folder(folder)
-    check_outputs([job.target for job in jobs], paths, request.force, WRITABLE)
+    outputs = [f for job in jobs for f in written_files(job.target, flatten=request.flatten)]
+    check_outputs(outputs, paths, request.force, WRITABLE)
     return jobs, code
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from usdhand.anatomy.channels import Channels, Hands
 from usdhand.errors import UsageError
 from usdhand.formats.files import read_any, read_clip
-from usdhand.formats.output import check_output
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import written_files
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.formats.usd.rig import StoredRig
@@ -130,7 +131,8 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
     variation = Variation(request.variation, request.seed)
     conventions = load_conventions(*request.maps)
     inputs = [p for p in (request.rig, request.motion, request.onto) if p is not None]
-    check_output(request.output, inputs, request.force, USD_SUFFIXES)
+    outputs = written_files(request.output, flatten=request.flatten)
+    check_outputs(outputs, inputs, request.force, USD_SUFFIXES)
     rig, motion = _baked(request, journal, conventions, variation)
     journal.about(motion.origin.path, motion.problems, "warning")
     journal.about(motion.origin.path, misleading_names(motion, conventions), "warning")

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from usdhand.errors import InputError, UsageError
+from usdhand.formats.paths import MOTION_SUFFIX
 from usdhand.formats.suffixes import READABLE
 
 
@@ -29,7 +30,7 @@ def find_files(arguments: Iterable[str], suffixes: Sequence[str] = READABLE) -> 
             found.update(dict.fromkeys(_named(argument, suffixes)))
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read ({error.strerror}).") from error
-    return list(found)
+    return [path for path in found if not _part_of(path, found)]
 
 
 def find_files_below(arguments: Iterable[str]) -> list[Path]:
@@ -48,6 +49,16 @@ def find_files_below(arguments: Iterable[str]) -> list[Path]:
     return list(found.values())
 
 
+def _part_of(path: Path, others: Iterable[Path] = ()) -> bool:
+    """Whether a file is but the motion of a layer, which is among others, or wherever it is."""
+    if not path.name.endswith(MOTION_SUFFIX):
+        return False
+    from usdhand.formats.usd.motion_crate import motion_of
+
+    name = motion_of(path)
+    return name is not None and (not others or path.with_name(name) in others)
+
+
 def _named(argument: str, suffixes: Sequence[str]) -> list[Path]:
     if not argument:
         raise UsageError("A file name is empty.")
@@ -56,18 +67,19 @@ def _named(argument: str, suffixes: Sequence[str]) -> list[Path]:
         inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
         if not inside:
             raise UsageError(f"{path} holds no {', '.join(suffixes)} file.")
-        return [p for p in inside if not p.name.startswith(".")]
+        return [p for p in inside if not p.name.startswith(".") and not _part_of(p)]
     if not path.exists() and glob.has_magic(argument):
         matches = sorted(Path(p) for p in glob.glob(argument, recursive=True))  # noqa: PTH207
         if not matches:
             raise UsageError(f"No file matches {argument}.")
-        return matches
+        return [p for p in matches if not _part_of(p)] or matches
     return [path]
 
 
 def _below(folder: Path) -> list[Path]:
     below = (p for p in sorted(folder.rglob("*")) if p.suffix.lower() in READABLE)
-    paths = [p for p in below if p.is_file() and not _hidden(p.relative_to(folder))]
+    files = (p for p in below if p.is_file() and not _hidden(p.relative_to(folder)))
+    paths = [p for p in files if not _part_of(p)]
     if not paths:
         raise UsageError(f"{folder} and the folders below hold no {', '.join(READABLE)} file.")
     return paths

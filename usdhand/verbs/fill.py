@@ -15,7 +15,8 @@ from usdhand.fill.results import Filled
 from usdhand.fill.settings import FillSettings
 from usdhand.formats.files import read_clip
 from usdhand.formats.hashing import file_hash
-from usdhand.formats.output import check_output
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import written_files
 from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.library import is_library, read_library
@@ -140,7 +141,8 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
     """Fill a body's fingers from a library."""
     output, wanted = request.output, sides(request.side)
     given = [request.body, request.library, *filter(None, [request.fingers_from])]
-    check_output(output, given, request.force, USD_SUFFIXES)
+    outputs = written_files(output, flatten=request.flatten)
+    check_outputs(outputs, given, request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
     conventions = load_conventions(*request.maps)

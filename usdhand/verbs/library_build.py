@@ -21,7 +21,8 @@ from usdhand.errors import (
 from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.fill.settings import Segmentation
 from usdhand.formats.atomic import ending_signals
-from usdhand.formats.output import check_output
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import written_files
 from usdhand.formats.usd.library import is_library, read_library, write_library
 from usdhand.inputs import read_text
 from usdhand.problems import counted, listed
@@ -46,7 +47,7 @@ def run(request: LibraryBuildRequest, journal: Journal) -> Outcome:
     """Read what is new or changed, and write the library."""
     output = request.output
     paths = [p for p in find_files_below(request.clips) if not _same(p, output)]
-    check_output(output, paths, True, OUTPUTS)
+    check_outputs(written_files(output), paths, True, OUTPUTS)
     previous = _previous(request, journal)
     labels = _read_labels(request.labels) if request.labels else None
     conventions = load_conventions(*request.maps) if request.maps else None

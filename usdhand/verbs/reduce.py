@@ -13,7 +13,8 @@ from usdhand.anatomy import SIDES, Hands, Side
 from usdhand.anatomy.channels import Channels
 from usdhand.errors import OutputError, UsageError
 from usdhand.formats.files import read_clip
-from usdhand.formats.output import check_folder, check_output, check_outputs, make_folder
+from usdhand.formats.output import check_folder, check_outputs, make_folder
+from usdhand.formats.paths import written_files
 from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
@@ -213,7 +214,7 @@ def run(request: ReduceRequest, journal: Journal) -> Outcome:
     outputs = _outputs(paths, request.output)
     inputs = [*paths, *([request.rig] if request.rig else []), *request.maps]
     _check_fitting(request)
-    _check_outputs(outputs, inputs, request.force)
+    _check_outputs(outputs, inputs, request)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
     conventions = load_conventions(*request.maps)
@@ -266,7 +267,8 @@ def _fit_only(request: ReduceRequest, journal: Journal) -> Outcome:
     if request.flatten:
         raise UsageError("--fit-only writes one file without a character; --flatten has no use.")
     _check_fitting(request)
-    check_output(request.output, [*paths, *request.maps], request.force, USD_SUFFIXES)
+    own = written_files(request.output)
+    check_outputs(own, [*paths, *request.maps], request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, curve.NAMES, request.force)
 
@@ -326,11 +328,12 @@ def _outputs(paths: Sequence[Path], output: Path) -> list[Path]:
     return [output / f"{path.stem}.rig.usdc" for path in paths]
 
 
-def _check_outputs(outputs: Sequence[Path], inputs: Sequence[Path], force: bool) -> None:
+def _check_outputs(outputs: Sequence[Path], inputs: Sequence[Path], request: ReduceRequest) -> None:
     if len(set(outputs)) < len(outputs):
         raise OutputError("Two clips have the same name, so their rigs would replace each other.")
     folder = outputs[0].parent
     if len(outputs) > 1 and not folder.exists():  # made once there is something to put in
         check_folder(folder)
         return
-    check_outputs(outputs, inputs, force, USD_SUFFIXES)
+    own = [path for output in outputs for path in written_files(output, flatten=request.flatten)]
+    check_outputs(own, inputs, request.force, USD_SUFFIXES)

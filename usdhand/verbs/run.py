@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,9 @@ def run_verb(request: Request, journal: Journal) -> Outcome:
         check_output(report, (), force, (".json",))
     module = importlib.import_module(f"usdhand.verbs.{request.verb.replace(' ', '_')}")
     verb: Callable[[Any, Journal], Outcome] = module.run
-    outcome = replace(verb(request, journal), problems=tuple(journal.problems))
+    outcome = verb(request, journal)
+    written = tuple(_with_parts(outcome.written))
+    outcome = replace(outcome, written=written, problems=tuple(journal.problems))
     if report is not None and outcome.request is request:
         _write(report, outcome.to_json(), force)
     folder = getattr(request, "plots", None)
@@ -53,6 +55,17 @@ def run_verb(request: Request, journal: Journal) -> Outcome:
         write_plots(folder, outcome.figures(), force)
         outcome = replace(outcome, drawn=folder)
     return outcome
+
+
+def _with_parts(written: Sequence[Path]) -> Iterator[Path]:
+    """Files that were written, and the crates that keep the motion of ascii ones."""
+    for path in written:
+        yield path
+        if path.suffix.lower() == ".usda":
+            from usdhand.formats.usd.motion_crate import own_crate
+
+            if crate := own_crate(path):
+                yield crate
 
 
 def _write(path: Path, text: str, force: bool) -> None:

@@ -12,7 +12,8 @@ import numpy as np
 from usdhand.anatomy import SIDES, Side
 from usdhand.errors import UsageError, UsdHandError
 from usdhand.formats.files import read_clip
-from usdhand.formats.output import check_output
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import written_files
 from usdhand.formats.sources import character_under
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.character import as_on_stage
@@ -166,7 +167,8 @@ def write_spliced(
 def run(request: SpliceRequest, journal: Journal) -> Outcome:
     """Splice a hand clip onto a body clip."""
     body, hands, output = request.body, request.hands, request.output
-    check_output(output, [body, hands], request.force, USD_SUFFIXES)
+    outputs = written_files(output, flatten=request.flatten)
+    check_outputs(outputs, [body, hands], request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
     conventions = load_conventions(*request.maps)

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, Usd, UsdSkel, Vt
 
-from usdhand.formats.output import check_output
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import written_files
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.animation import animation_losses, author_animation
 from usdhand.formats.usd.bindings import apply_api, bind_animation
@@ -90,6 +91,7 @@ def write_placed(
     output: Path,
     *,
     edited: bool,
+    flatten: bool = False,
     allow_outside: bool = False,
     force: bool = False,
     inputs: Sequence[Path] = (),
@@ -112,8 +114,11 @@ def write_placed(
     """
     check_name(output)
     check_clip(clip, character.path, "the result")
-    check_output(
-        output, [character.path, *stage_files(character.stage), *inputs], force, USD_SUFFIXES
+    check_outputs(
+        written_files(output, flatten=flatten),
+        [character.path, *stage_files(character.stage), *inputs],
+        force,
+        USD_SUFFIXES,
     )
     stage = character.stage
     if not stage.GetRootLayer().anonymous:
@@ -138,11 +143,12 @@ def write_placed(
     local = _local_in_file(character, clip)
     stage.GetRootLayer().TransferContent(layer)
     _mend_skeleton(stage.GetPrimAtPath(character.skeleton.GetPath()), clip.skeleton, poses, local)
-    return (*lost, *save_flat(stage, output, allow_outside=allow_outside))
+    saved = save_flat(stage, output, allow_outside=allow_outside, split=not flatten)
+    return (*lost, *saved)
 
 
 def write_made(
-    clip: Clip, output: Path, *, up: str = "Y", animated: bool = True
+    clip: Clip, output: Path, *, up: str = "Y", animated: bool = True, flatten: bool = False
 ) -> tuple[Problem, ...]:
     """Write a clip as a file with a complete character and nothing else; see `character_of`.
 
@@ -152,7 +158,7 @@ def write_made(
     stage = character_of(legal_clip(clip), up=up, animated=animated).stage
     if output.suffix.lower() == ".usdz":
         return save_flat(stage, output)
-    return save_layer(stage.GetRootLayer(), output, flatten=False)
+    return save_layer(stage.GetRootLayer(), output, flatten=flatten)
 
 
 def motion_variants(character: Character) -> list[tuple[Sdf.Path, str, str]]:

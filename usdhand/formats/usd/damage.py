@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import wraps
@@ -25,11 +26,17 @@ def usd_diagnostics() -> Iterator[list[str]]:
     """Collect what USD would print to stderr, as plain sentences."""
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
     messages: list[str] = []
+    shown, sys.excepthook = sys.excepthook, _not_shown
     try:
         yield messages
     finally:
+        sys.excepthook = shown
         messages += [sentence(d) for d in delegate.TakeUncoalescedDiagnostics()]
         del delegate
+
+
+def _not_shown(*_: object) -> None:
+    """Stand for what shows errors that nobody handles: USD has it show those of its values."""
 
 
 @contextmanager

@@ -29,7 +29,7 @@ from usdhand.fill.library import (
 )
 from usdhand.fill.settings import Segmentation
 from usdhand.formats import paths
-from usdhand.formats.output import check_output
+from usdhand.formats.output import check_outputs
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.damage import damage_refused, refuses_damage, usd_diagnostics
 from usdhand.formats.usd.stage import Character, compose, open_stage
@@ -53,7 +53,7 @@ def write_library(library: MotionLibrary, output: str | Path, *, force: bool = F
         if the output is refused or cannot be written.
     """
     output = Path(output)
-    check_output(output, (), force, [s for s in USD_SUFFIXES if s != ".usdz"])
+    check_outputs(paths.written_files(output), (), force, [s for s in USD_SUFFIXES if s != ".usdz"])
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     with Sdf.ChangeBlock():
         root = _prim(layer, ROOT, "Scope")

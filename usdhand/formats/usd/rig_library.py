@@ -6,9 +6,10 @@ from pathlib import Path
 
 from pxr import Sdf
 
-from usdhand.formats.output import check_output
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import written_files
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.formats.usd.damage import damage_refused
+from usdhand.formats.usd.damage import refuses_damage
 from usdhand.formats.usd.rig import RIG_NAME, find_rig, read_rig_at, rig_prims
 from usdhand.formats.usd.rig_author import author_relations
 from usdhand.formats.usd.stage import Character, character_on, open_stage
@@ -25,7 +26,7 @@ def write_fitted_rig(rig: ReducedRig, output: str | Path, *, force: bool = False
         if the output is refused or cannot be written.
     """
     output = Path(output)
-    check_output(output, (), force, [s for s in USD_SUFFIXES if s != ".usdz"])
+    check_outputs(written_files(output), (), force, [s for s in USD_SUFFIXES if s != ".usdz"])
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     with Sdf.ChangeBlock():
         author_relations(layer, Sdf.Path(f"/{RIG_NAME}"), rig)
@@ -33,6 +34,7 @@ def write_fitted_rig(rig: ReducedRig, output: str | Path, *, force: bool = False
     save_layer(layer, output, flatten=False)
 
 
+@refuses_damage
 def read_with_rig(
     path: Path, skel: str | None = None
 ) -> tuple[ReducedRig | None, Character | None]:
@@ -49,10 +51,9 @@ def read_with_rig(
     """
     stage, problems = open_stage(path)
     rig = None
-    with damage_refused(path):
-        if any(True for _ in rig_prims(stage)):
-            prim = find_rig(stage, path, skel)
-            rig = read_rig_at(prim, path)
-            if not prim.GetRelationship("usdhand:skeleton"):
-                return rig, None
+    if any(True for _ in rig_prims(stage)):
+        prim = find_rig(stage, path, skel)
+        rig = read_rig_at(prim, path)
+        if not prim.GetRelationship("usdhand:skeleton"):
+            return rig, None
     return rig, character_on(stage, path, problems, skel)

@@ -11,6 +11,7 @@ from pxr import Sdf, Usd, UsdSkel
 
 from usdhand.errors import UsdHandError
 from usdhand.formats.hashing import file_hash
+from usdhand.formats.usd.motion_crate import own_crate
 from usdhand.formats.usd.read import clip_from_character
 from usdhand.formats.usd.stage import Character, find_character
 from usdhand.motion.rotations import Array
@@ -76,8 +77,8 @@ def rig_source(prim: Usd.Prim) -> RigSource | None:
     targets = relationship.targetPathList.explicitItems if relationship else []
     if not layer.realPath or not len(layer.subLayerPaths) or not targets:
         return None
-    below = Sdf.Layer.FindRelativeToLayer(layer, layer.subLayerPaths[0])
-    if not below or not below.realPath:
+    below = Sdf.Layer.FindRelativeToLayer(layer, layer.subLayerPaths[-1])  # below its own motion
+    if not below or not below.realPath or Path(below.realPath) == own_crate(Path(layer.realPath)):
         return None
     return RigSource(Path(layer.realPath), Path(below.realPath), str(targets[0]), spec.default)
 

@@ -14,6 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdSkel, Work
 from usdhand.errors import InputError, UsageError
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.damage import first_line, refuses_damage, sentence, usd_diagnostics
+from usdhand.formats.usd.motion_crate import motion_of, other_motion
 from usdhand.inputs import why_no_file
 from usdhand.problems import CHOICES, Problem, listed
 from usdhand.witness import opening
@@ -125,6 +126,9 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     ]
     if not problems:
         problems = [Problem("usd", first_line(message)) for message in messages]
+    if crate := other_motion(stage.GetRootLayer()):
+        message = f"{crate} is not as it was written with this file: the motion may be another one"
+        problems.append(Problem("other-motion", message))
     return stage, tuple(problems)
 
 
@@ -174,6 +178,8 @@ def character_on(
     skeletons = find_skeletons(stage)
     if not skeletons:
         lost = f" Note: {problems[0]}." if problems else ""
+        if name := motion_of(path):
+            lost = f" It holds the motion of {name}: give that file."
         raise InputError(f"{path}: there is no UsdSkel skeleton on this stage.{lost}")
     prim = choose_skeleton(path, skeletons, skel)
     return Character(stage, path, prim, bound_animation(prim), problems)

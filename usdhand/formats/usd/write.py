@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdSkel, UsdUtils
+from pxr import Sdf, Usd, UsdSkel, UsdUtils
 
-from usdhand.errors import OutputError, UsageError, UsdHandError
-from usdhand.formats.atomic import written_beside
-from usdhand.formats.output import check_output
-from usdhand.formats.paths import relative_path
+from usdhand.errors import OutputError, UsageError
+from usdhand.formats.atomic import ended_by_exception, written_beside
+from usdhand.formats.output import check_outputs
+from usdhand.formats.paths import relative_path, written_files
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.add_joints import author_joints, joint_tokens
 from usdhand.formats.usd.animation import animation_losses, author_animation, author_variants
@@ -24,11 +23,12 @@ from usdhand.formats.usd.curves import Tracks
 from usdhand.formats.usd.damage import refuses_damage, usd_diagnostics
 from usdhand.formats.usd.extents import author_extents, withhold_extents
 from usdhand.formats.usd.flatten import flat_layer
+from usdhand.formats.usd.motion_crate import described
+from usdhand.formats.usd.saving import export, reload, save, verify
 from usdhand.formats.usd.stage import (
     Character,
     compose,
     is_text,
-    open_stage,
     readable,
 )
 from usdhand.formats.usd.textures import (
@@ -103,7 +103,12 @@ def write_motion(
         if the output is refused or cannot be written; nothing is left behind then.
     """
     check_name(output)
-    check_output(output, [*stage_files(character.stage), *inputs], force, USD_SUFFIXES)
+    check_outputs(
+        written_files(output, flatten=flatten),
+        [*stage_files(character.stage), *inputs],
+        force,
+        USD_SUFFIXES,
+    )
     clips = {
         name: as_on_stage(motion, character) for name, motion in (variants or {"": clip}).items()
     }
@@ -151,17 +156,16 @@ def save_layer(
         return save_flat(stage, output, allow_outside=allow_outside)
     check_name(output)
     problems = _make_relative(layer, output)
-    with written_beside(output) as temporary:
-        _export(layer, temporary)
-        _verify(temporary)
-    _reload(output)
+    save(layer, output, split=True)
     return problems
 
 
 def save_flat(
-    stage: Usd.Stage, output: Path, *, allow_outside: bool = False
+    stage: Usd.Stage, output: Path, *, allow_outside: bool = False, split: bool = False
 ) -> tuple[Problem, ...]:
     """Save all of a stage as one file, or package; see `save_layer`.
+
+    With ``split``, the motion of an ascii file is in a crate beside it; see `motion_crate`.
 
     Raises
     ------
@@ -176,23 +180,16 @@ def save_flat(
             f"{output}: {listed(found)} would be packed, from outside the input's folder. Give "
             "--allow-outside if that is meant."
         )
-    with ExitStack() as undone, written_beside(output) as temporary:
-        if packed:
+    if packed:
+        with written_beside(output) as temporary:
             problems += _package(flat, temporary, output)
-        else:
-            problems += undone.enter_context(unpacked_beside(flat, output))
-            problems += _make_all_relative(flat, output)
-            _export(flat, temporary)
-        _verify(temporary)
-    _reload(output)
+            verify(temporary)
+        reload(output)
+        return problems
+    with ended_by_exception(), unpacked_beside(flat, output) as told:
+        problems += told + _make_all_relative(flat, output)
+        save(flat, output, split=split)
     return problems
-
-
-def _reload(output: Path) -> None:
-    """Let stages of this process that show the file show what it is now."""
-    loaded = Sdf.Layer.Find(str(output.absolute()))
-    if loaded:
-        loaded.Reload(force=True)
 
 
 def check_name(output: Path) -> None:
@@ -248,7 +245,7 @@ def _package(flat: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, .
         path = Path(folder, "flat.usdc")
         missing = missing_files(flat)
         _make_all_relative(flat, path)
-        _export(flat, path)
+        export(flat, path)
         name = f"{output.stem}.usdc"
         with usd_diagnostics() as messages:
             done = UsdUtils.CreateNewUsdzPackage(str(path), str(temporary), name)
@@ -262,27 +259,6 @@ def _package(flat: Sdf.Layer, temporary: Path, output: Path) -> tuple[Problem, .
 def stage_files(stage: Usd.Stage) -> list[Path]:
     """All files that a stage is made of."""
     return [Path(layer.realPath) for layer in stage.GetUsedLayers() if layer.realPath]
-
-
-def _export(layer: Sdf.Layer, path: Path) -> None:
-    try:
-        done = layer.Export(str(path))
-    except Tf.ErrorException as error:
-        raise OutputError(f"{path.parent}: USD cannot write there ({error.args[0]}).") from error
-    if not done:
-        raise OutputError(f"{path.parent}: USD cannot write there.")
-
-
-def _verify(path: Path) -> None:
-    """Open what was written. What the input lacks is the input's, but it must be found."""
-    try:
-        stage, _ = open_stage(path)
-    except UsdHandError as error:
-        raise OutputError(f"What was written cannot be read back: {error}") from error
-    layer = stage.GetRootLayer()
-    for asset in layer.subLayerPaths:
-        if not Sdf.Layer.FindRelativeToLayer(layer, asset):  # the stage has opened it
-            raise OutputError(f"{asset} cannot be found from {path.parent}.")
 
 
 def layer_over(stage: Usd.Stage) -> Sdf.Layer:
@@ -300,6 +276,8 @@ def layer_over(stage: Usd.Stage) -> Sdf.Layer:
     for field in sorted(source.pseudoRoot.ListInfoKeys()):  # listed by memory address
         if field not in LAYER_FIELDS:
             layer.pseudoRoot.SetInfo(field, source.pseudoRoot.GetInfo(field))
+    if layer.customLayerData:
+        layer.customLayerData = described(source)
     layer.timeCodesPerSecond = stage.GetTimeCodesPerSecond()
     layer.framesPerSecond = stage.GetFramesPerSecond()
     for field in ("upAxis", "metersPerUnit", "kilogramsPerUnit"):
