@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cache
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from usdhand.reduce.moments import Moments
 from usdhand.reduce.relate import RIDGES, Shape, best_shape, left_out, residual_moments, told_by
 from usdhand.reduce.rig import Relation
 from usdhand.reduce.settings import Criteria, Target
+from usdhand.reduce.sparse import exchanged_for_few, grown_for_few
 from usdhand.reduce.subset import Subsets
 
 # Share of its variance that each channel of several takes is held to have of its own, when channels
@@ -100,7 +102,7 @@ def model_of(
     """How all channels follow the free ones."""
     measure = evidence.measure(choice.measure)
     shape = best_shape(evidence.folds, free, measure, controllers)
-    return Model(tuple(free), shape, told_by(evidence.moments, free, shape))
+    return Model(tuple(free), shape, told_by(evidence.moments.covariance, free, shape))
 
 
 def relations_of(evidence: Takes, model: Model) -> tuple[Relation, ...]:
@@ -152,7 +154,15 @@ def _for_count(evidence: Takes, count: int, controllers: int | None, choice: Cri
     while len(search.channels(free)) > count:
         groups -= 1
         free = search.best(groups)
+    free = _to_follow(search, free, controllers)
     return model_of(evidence, search.channels(free), controllers, choice)
+
+
+def _to_follow(search: Subsets, free: frozenset[int], controllers: int | None) -> frozenset[int]:
+    """About the same channels, those that serve where each channel follows so many of them."""
+    if controllers is None or controllers >= len(search.channels(free)):
+        return free
+    return exchanged_for_few(search, free, controllers)
 
 
 def _for_error(evidence: Takes, most: float, controllers: int | None, choice: Criteria) -> Model:
@@ -167,24 +177,50 @@ def _for_error(evidence: Takes, most: float, controllers: int | None, choice: Cr
         parts = measure.parts(residual_moments(told, moments, moments))
         return bool(parts.max(initial=0.0) <= most**2)
 
-    def model(free: Sequence[int]) -> Model | None:
+    @cache
+    def model(chosen: frozenset[int]) -> Model | None:
         """What serves takes left out if it meets the error, else what fits most closely."""
+        free = search.channels(chosen)
         found = model_of(evidence, free, controllers, choice)
         if met(found.told):
             return found
-        shape = Shape(controllers, RIDGES[0])
-        closest = told_by(moments, free, shape)
+        shape = Shape(controllers, RIDGES[0], 0.0)
+        closest = told_by(moments.covariance, free, shape)
         return Model(tuple(free), shape, closest) if met(closest) else None
 
     for chosen in search.path():
         if measure.parts(search.residual(chosen)).max(initial=0.0) > most**2:
             continue  # not even with all controllers
-        tried = (search.best(len(chosen) - 1),) if len(chosen) > len(search.keep) else ()
-        for free in (*tried, chosen):
-            found = model(search.channels(free))
-            if found is not None:
-                return found
+        if controllers is not None:
+            chosen = _fewest(search, chosen, controllers, lambda some: model(some) is not None)
+        tried = [chosen]
+        if len(chosen) > len(search.keep):
+            tried.insert(0, _to_follow(search, search.best(len(chosen) - 1), controllers))
+        found = next((m for m in map(model, tried) if m is not None), None)
+        if found is not None:
+            return found
     return model_of(evidence, search.channels(frozenset(range(len(search.groups)))), None, choice)
+
+
+def _fewest(
+    search: Subsets,
+    chosen: frozenset[int],
+    controllers: int,
+    enough: Callable[[frozenset[int]], bool],
+) -> frozenset[int]:
+    """The chosen groups, or about the fewest more that are enough with few controllers."""
+    less, step = exchanged_for_few(search, chosen, controllers), 1
+    if enough(less):
+        return less
+    while True:
+        more = grown_for_few(search, less, min(len(less) + step, len(search.groups)), controllers)
+        if enough(more) or len(more) == len(search.groups):
+            break
+        less, step = more, 2 * step
+    while len(more) > len(less) + 1:
+        between = grown_for_few(search, less, (len(less) + len(more)) // 2, controllers)
+        less, more = (less, between) if enough(between) else (between, more)
+    return more
 
 
 def _named(names: Sequence[str], pattern: str) -> list[str]:

@@ -130,7 +130,9 @@ def _losses(
             continue
         first = axes[:, : len(free)]
         found[len(free)] = (
-            Loss.of(residual_moments(told_by(fitted, free, shape), fitted, target), evidence),
+            Loss.of(
+                residual_moments(told_by(fitted.covariance, free, shape), fitted, target), evidence
+            ),
             Loss.of(residual_moments(first @ first.T, fitted, target), evidence),
         )
     return found

@@ -27,15 +27,22 @@ ALIKE = 1.02**2
 
 @dataclass(frozen=True)
 class Shape:
-    """How a model is fitted: at most so many controllers a channel (None: all), and the ridge."""
+    """How a model is fitted.
+
+    Attributes
+    ----------
+    controllers : at most so many a channel; None for all
+    ridge : share of each controller's variance
+    spared : fewer controllers are taken where that raises a channel's error by at most this share
+    """
 
     controllers: int | None = None
     ridge: float = RIDGES[0]
+    spared: float = WORTHWHILE
 
 
-def told_by(moments: Moments, free: Sequence[int], shape: Shape) -> Array:
-    """(n, n) model of all channels from the free ones."""
-    covariance = moments.covariance
+def told_by(covariance: Array, free: Sequence[int], shape: Shape) -> Array:
+    """(n, n) model of all channels, of a covariance (n, n), from the free ones."""
     n, k = len(covariance), len(free)
     told = np.zeros((n, n))
     told[free, free] = 1.0
@@ -43,8 +50,8 @@ def told_by(moments: Moments, free: Sequence[int], shape: Shape) -> Array:
     if not k or not len(dependent):
         return told
     most = k if shape.controllers is None else min(shape.controllers, k)
-    order, left = _controllers_in_order(covariance, np.asarray(free), dependent, most)
-    enough = left <= left[:, -1:] * (1.0 + WORTHWHILE) ** 2 + TINY
+    order, left = controllers_in_order(covariance, np.asarray(free), dependent, most)
+    enough = left <= left[:, -1:] * (1.0 + shape.spared) ** 2 + TINY
     counts = enough.argmax(axis=1)
     ridge = covariance + np.diag((SAME_SHARE + shape.ridge) * np.diag(covariance) + TINY)
     for count in np.unique(counts[counts > 0]):
@@ -69,7 +76,7 @@ def left_out(folds: Sequence[Moments], free: Sequence[int], shape: Shape) -> Arr
     total = np.zeros((len(folds[0].mean),) * 2)
     for i, fold in enumerate(folds):
         others = pooled(f for j, f in enumerate(folds) if j != i)
-        missed = residual_moments(told_by(others, free, shape), others, fold)
+        missed = residual_moments(told_by(others.covariance, free, shape), others, fold)
         total += fold.frames / frames * missed
     return total
 
@@ -101,7 +108,7 @@ def best_shape(
     )
 
 
-def _controllers_in_order(
+def controllers_in_order(
     covariance: Array, free: NDArray[np.intp], dependent: NDArray[np.intp], most: int
 ) -> tuple[NDArray[np.intp], Array]:
     """Controllers (dependent, most), each the best beside those before it, and variances left.

@@ -134,7 +134,7 @@ class Subsets:
 
     def score(self, chosen: frozenset[int]) -> float:
         """The logarithm of error and prices that is made small."""
-        return float(self._scores(self.measure.parts(self.residual(chosen)), chosen))
+        return float(self.scores(self.measure.parts(self.residual(chosen)), chosen))
 
     def exchanged(self, chosen: frozenset[int]) -> frozenset[int]:
         """Swap single groups, the best swap of each first, while that lowers the score."""
@@ -184,7 +184,8 @@ class Subsets:
         return tuple((of, np.array([self.groups[i] for i in of])) for of in numbers)
 
     @cached_property
-    def _log_price(self) -> Array:
+    def log_price(self) -> Array:
+        """(groups,) what each adds to the score by its price."""
         return np.zeros(len(self.groups)) if self.price is None else np.log(self.price)
 
     def _solve(self, chosen: frozenset[int]) -> _Solved:
@@ -214,8 +215,8 @@ class Subsets:
             diagonal = np.arange(groups.shape[1])
             among[:, diagonal, diagonal] += self._nugget[groups]
             falls = self.measure.falls(columns, _inverse(among))
-            scores[numbers] = self._scores(parts - falls, chosen)
-        scores += self._log_price
+            scores[numbers] = self.scores(parts - falls, chosen)
+        scores += self.log_price
         scores[list(chosen)] = np.inf
         return scores
 
@@ -231,15 +232,15 @@ class Subsets:
             columns = solved.told[own].transpose(0, 2, 1)
             among = solved.inverse[own[:, :, None], own[:, None, :]]
             rises = self.measure.falls(columns, _inverse(among))
-            scores[numbers[there]] = self._scores(parts + rises, chosen)
-        return np.asarray(scores - self._log_price)
+            scores[numbers[there]] = self.scores(parts + rises, chosen)
+        return np.asarray(scores - self.log_price)
 
-    def _scores(self, parts: Array, chosen: frozenset[int]) -> Array:
+    def scores(self, parts: Array, chosen: frozenset[int]) -> Array:
         """Logarithms of the errors of squared parts (..., parts), with the prices of the chosen."""
         parts = np.maximum(parts, 0.0)
         if self.largest is not None:
             parts = np.maximum(parts - self.largest**2, 0.0)
-        price = self._log_price[list(chosen)].sum()
+        price = self.log_price[list(chosen)].sum()
         return np.asarray(np.log(parts.mean(axis=-1) + SAME_SHARE * self._total + TINY) + price)
 
     @cached_property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -46,15 +47,15 @@ def band_covariances(curves: Array, fps: float) -> Array:
     to the first be taken for fast motion, and the mean is left out.
     """
     frames = len(curves)
-    centred = curves - curves.mean(axis=0)
-    faded = centred * np.hanning(frames + 2)[1:-1, None]
+    faded = np.ascontiguousarray(curves.T)  # by channels, so that bands are blocks
+    faded = faded - faded.mean(axis=1, keepdims=True)
+    wanted = np.einsum("nf,nf->n", faded, faded) / frames
+    faded *= np.hanning(frames + 2)[1:-1]
     size = fft.next_fast_len(frames, real=True)
-    spectrum = fft.rfft(faded, size, axis=0)
-    band = bands_of(size, fps)
-    parts = np.concatenate([spectrum.real, spectrum.imag])
-    both = np.tile(band, 2)
-    found = np.stack([_square(parts[both == b]) for b in range(len(EDGES_HZ))])
-    power, wanted = np.einsum("bii->i", found), np.mean(centred**2, axis=0)
+    parts = fft.rfft(faded, size, axis=1).view(np.float64)
+    first = 2 * np.searchsorted(bands_of(size, fps), np.arange(len(EDGES_HZ) + 1))
+    found = np.stack([parts[:, a:b] @ parts[:, a:b].T for a, b in pairwise(first)])
+    power = np.einsum("bii->i", found)
     scale = np.sqrt(np.divide(wanted, power, out=np.zeros_like(power), where=power > 0))
     return np.asarray(scale[:, None] * found * scale)
 
@@ -62,10 +63,6 @@ def band_covariances(curves: Array, fps: float) -> Array:
 def bands_of(size: int, fps: float) -> Array:
     """Number of the band of every bin of a real transform of that size."""
     return np.asarray(np.searchsorted(EDGES_HZ, fft.rfftfreq(size, 1.0 / fps), side="right") - 1)
-
-
-def _square(rows: Array) -> Array:
-    return np.asarray(rows.T @ rows)
 
 
 @dataclass(frozen=True)
