@@ -32,6 +32,7 @@ from usdhand.reduce.method import apply_rig, fit_rig, fit_to
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.search import thresholds_for_count
 from usdhand.reduce.settings import PRESETS, Criteria, Fit, Target
+from usdhand.verbs.files import find_files
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples" / "gestures"
 FITS: dict[str, tuple[Fit, int]] = {
@@ -43,6 +44,11 @@ COUNTS = range(5, 55, 5)
 # Best channels and thresholds searched for the same number: label -> most controllers.
 BEST: dict[str, int | None] = {"best": None, "best, at most 3": 3, "best, 1": 1}
 SEARCHED: dict[str, int] = {"searched, at most 3": 3, "searched, 1": 1}
+
+
+def files(folder: Path) -> list[Path]:
+    """A folder's clips, by name."""
+    return find_files([str(folder)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +252,9 @@ def print_others(takes: Sequence[Take], others: Sequence[Path]) -> None:
     known = [t for i, t in enumerate(takes) if i % 3 != 2]
     groups = {"left out": [t for i, t in enumerate(takes) if i % 3 == 2]}
     for folder in others:
-        paths = [folder] if folder.is_file() else sorted(folder.glob("*.usd*"))
+        paths = files(folder)
+        if folder.resolve() == SAMPLES:
+            paths = paths[2::3]  # constants were chosen on the others: `reduce_constants.py`
         groups[folder.name] = [t for t in map(Take.read, paths) if _fits(t, known[0])]
     known_curves = np.concatenate([t.curves for t in known])
     print(
@@ -305,7 +313,7 @@ def main() -> None:
     parser.add_argument("--others", type=Path, nargs="*", default=[])
     given = parser.parse_args()
     folder: Path = given.data
-    takes = [Take.read(p) for p in sorted(folder.glob("*.usd*"))]
+    takes = [Take.read(p) for p in files(folder)]
     frames = sum(len(t.clip) for t in takes)
     print(f"{len(takes)} takes, {frames} frames.\n")
     print_alone(takes)

@@ -175,6 +175,20 @@ def test_takes_are_gathered_one_at_a_time_into_few_folds() -> None:
     assert len(evidence.sources) == 2 * MOST_FOLDS
 
 
+@pytest.mark.parametrize("controllers", [None, 2])
+def test_moving_one_hand_leaves_the_other(controllers: int | None) -> None:
+    """Of takes in which hands move apart: no channel follows one of the other hand."""
+    apart = []
+    for seed in range(4):
+        clip, hands, source = take(seed)
+        other = take(seed + 50)[2].select([n for n in source.names if n.startswith("ri")])
+        apart.append((clip, hands, source.replaced(other)))
+    rig = fit_to(gather(apart), Target(free_channels=12), "least-squares", controllers)
+    assert {name[:2] for name in rig.free} == {"le", "ri"}
+    for relation in rig.relations:
+        assert {name[:2] for name in relation.controllers} <= {relation.name[:2]}
+
+
 def test_whole_turns_between_takes_are_taken_off() -> None:
     clip, hands, source = TAKES[0]
     values = source.values.copy()

@@ -22,10 +22,6 @@ from usdhand.reduce.settings import Criteria, Target
 from usdhand.reduce.sparse import exchanged_for_few, grown_for_few
 from usdhand.reduce.subset import Subsets
 
-# Share of its variance that each channel of several takes is held to have of its own, when channels
-# are chosen: other motion follows the relations less, and errors there are smaller where channels
-# that move far are free. Measured by `benchmarks/reduce_takes.py` on motion of other kinds.
-OWN_SHARE = 0.05
 # A twist or spread must lower the squared error so many times more than a flexion.
 PREFERENCE = 1.2
 
@@ -90,9 +86,7 @@ def subsets(
     keep = frozenset(g for g, own in enumerate(groups) if any(names[i] in kept for i in own))
     dear = [not any(is_flexion(names[i]) for i in own) for own in groups]
     price = np.where(dear, PREFERENCE, 1.0) if choice.prefer == "flexion" else None
-    covariance = moments.covariance
-    if len(evidence.folds) > 1 and largest is None:
-        covariance = covariance + OWN_SHARE * np.diag(np.diag(covariance))
+    covariance = evidence.related * moments.covariance
     return Subsets(covariance, evidence.measure(choice.measure), groups, keep, price, largest)
 
 
@@ -100,9 +94,9 @@ def model_of(
     evidence: Takes, free: Sequence[int], controllers: int | None, choice: Criteria
 ) -> Model:
     """How all channels follow the free ones."""
-    measure = evidence.measure(choice.measure)
-    shape = best_shape(evidence.folds, free, measure, controllers)
-    return Model(tuple(free), shape, told_by(evidence.moments.covariance, free, shape))
+    measure, related = evidence.measure(choice.measure), evidence.related
+    shape = best_shape(evidence.folds, free, measure, controllers, related)
+    return Model(tuple(free), shape, told_by(related * evidence.moments.covariance, free, shape))
 
 
 def relations_of(evidence: Takes, model: Model) -> tuple[Relation, ...]:
@@ -113,7 +107,7 @@ def relations_of(evidence: Takes, model: Model) -> tuple[Relation, ...]:
     errors = np.sqrt(np.maximum(np.diag(missed), 0.0))
     unseen: list[float | None] = [None] * len(names)
     if len(evidence.folds) > 1:
-        square = np.diag(left_out(evidence.folds, model.free, model.shape))
+        square = np.diag(left_out(evidence.folds, model.free, model.shape, evidence.related))
         unseen = [float(e) for e in np.sqrt(np.maximum(square, 0.0))]
     free = set(model.free)
 
@@ -185,7 +179,7 @@ def _for_error(evidence: Takes, most: float, controllers: int | None, choice: Cr
         if met(found.told):
             return found
         shape = Shape(controllers, RIDGES[0], 0.0)
-        closest = told_by(moments.covariance, free, shape)
+        closest = told_by(evidence.related * moments.covariance, free, shape)
         return Model(tuple(free), shape, closest) if met(closest) else None
 
     for chosen in search.path():

@@ -120,6 +120,7 @@ def _losses(
 ) -> dict[int, tuple[Loss, Loss]]:
     """Loss of the best channels, and of PCA, on what is shown, by count."""
     search = subsets(evidence, choice, fitted=fitted)
+    covariance = evidence.related * fitted.covariance
     axes = np.linalg.eigh(fitted.covariance)[1][:, ::-1]
     target = pooled(shown)
     found = {}
@@ -130,9 +131,7 @@ def _losses(
             continue
         first = axes[:, : len(free)]
         found[len(free)] = (
-            Loss.of(
-                residual_moments(told_by(fitted.covariance, free, shape), fitted, target), evidence
-            ),
+            Loss.of(residual_moments(told_by(covariance, free, shape), fitted, target), evidence),
             Loss.of(residual_moments(first @ first.T, fitted, target), evidence),
         )
     return found

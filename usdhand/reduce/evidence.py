@@ -14,6 +14,7 @@ from usdhand.errors import InputError
 from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.reduce.moments import Moments, pooled
+from usdhand.reduce.related import related_channels
 from usdhand.reduce.subset import Measure
 from usdhand.reduce.turns import whole_turns
 from usdhand.reduce.variation import band_covariances
@@ -57,6 +58,11 @@ class Takes:
     def moments(self) -> Moments:
         """Of all takes together."""
         return pooled(self.folds)
+
+    @cached_property
+    def related(self) -> Array:
+        """(n, n) 1 where a channel may follow another, else 0."""
+        return related_channels(self.names, self.folds)
 
     def measure(self, name: str) -> Measure:
         """What counts as error: "deg" or "mm"."""

@@ -70,19 +70,30 @@ def residual_moments(told: Array, fitted: Moments, shown: Moments) -> Array:
     return np.asarray(missed @ shown.about(fitted.mean) @ missed.T)
 
 
-def left_out(folds: Sequence[Moments], free: Sequence[int], shape: Shape) -> Array:
-    """(n, n) second moments of what models fitted to the other folds miss on each fold."""
+def left_out(
+    folds: Sequence[Moments], free: Sequence[int], shape: Shape, related: Array | float = 1.0
+) -> Array:
+    """(n, n) second moments of what models fitted to the other folds miss on each fold.
+
+    Parameters
+    ----------
+    related : (n, n) 1 where a channel may follow another, else 0
+    """
     frames = sum(fold.frames for fold in folds)
     total = np.zeros((len(folds[0].mean),) * 2)
     for i, fold in enumerate(folds):
         others = pooled(f for j, f in enumerate(folds) if j != i)
-        missed = residual_moments(told_by(others.covariance, free, shape), others, fold)
+        missed = residual_moments(told_by(related * others.covariance, free, shape), others, fold)
         total += fold.frames / frames * missed
     return total
 
 
 def best_shape(
-    folds: Sequence[Moments], free: Sequence[int], measure: Measure, most: int | None
+    folds: Sequence[Moments],
+    free: Sequence[int],
+    measure: Measure,
+    most: int | None,
+    related: Array | float = 1.0,
 ) -> Shape:
     """Ridge, and number of controllers up to ``most``, with the least error on folds left out.
 
@@ -94,7 +105,7 @@ def best_shape(
         return Shape(most)
 
     def error(shape: Shape) -> float:
-        return float(measure.parts(left_out(folds, free, shape)).mean())
+        return float(measure.parts(left_out(folds, free, shape, related)).mean())
 
     by_ridge = [error(Shape(most, r)) for r in RIDGES]
     ridge = max(r for r, e in zip(RIDGES, by_ridge, strict=True) if e <= min(by_ridge) * ALIKE)

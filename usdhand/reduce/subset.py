@@ -98,7 +98,7 @@ class Subsets:
         if comb(len(open_), max(wanted, 0)) <= MOST_TRIED:
             each = combinations(open_, max(wanted, 0))
             return min((self.keep | set(some) for some in each), key=self.score)
-        grown = self.exchanged(self._grown(self.keep, count))
+        grown = self.grown(self.keep, count)
         left = self.exchanged(self._shrunk(everything, count))
         chosen = left if self.score(left) < self.score(grown) + CLEARLY else grown
         forced = sorted(everything - chosen)
@@ -121,7 +121,7 @@ class Subsets:
         chosen = self.exchanged(self.keep)
         yield chosen
         while len(chosen) < len(self.groups):
-            chosen = self.exchanged(self._grown(chosen, len(chosen) + 1))
+            chosen = self.grown(chosen, len(chosen) + 1)
             yield chosen
 
     def channels(self, chosen: frozenset[int]) -> tuple[int, ...]:
@@ -153,6 +153,10 @@ class Subsets:
                 chosen, score, solved = swapped, found, self._solve(swapped)
                 left = [*left, *sorted(chosen - self.keep - {best} - set(left))]
         return chosen
+
+    def grown(self, chosen: frozenset[int], count: int) -> frozenset[int]:
+        """The chosen groups and others, ``count`` in all, exchanged."""
+        return self.exchanged(self._grown(chosen, count))
 
     def _grown(self, chosen: frozenset[int], count: int) -> frozenset[int]:
         """Add what lowers the score most, one group at a time."""
