@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
-from usdhand.anatomy import Hands, Side
+from usdhand.anatomy import Side
 from usdhand.errors import InputError, UsageError
 from usdhand.motion import Clip
 from usdhand.problems import Problem, counted
-from usdhand.splice.locate import RATE, locate
-from usdhand.splice.markers import hand_markers
+from usdhand.splice.locate import Place
 from usdhand.splice.settings import Pin
 
 # Parts whose lengths differ by more than this factor are worth a warning; clips that begin or end
@@ -22,6 +21,23 @@ LEAST_PART_S = 1.0
 MOST_CELLS = 4 * 2**30
 # Tolerance of the pins that are recommended, in seconds.
 ADVISED_TOLERANCE_S = 0.3
+# Tolerance of pins that motion tells.
+FOUND_TOLERANCE_S = 0.15
+
+
+def check_frames(body: Clip, hand_clip: Clip) -> None:
+    """Refuse clips that are too short to move.
+
+    Raises
+    ------
+    InputError
+        if a clip has less than three frames.
+    """
+    for name, clip in (("body", body), ("hand", hand_clip)):
+        if len(clip) < 3:
+            raise InputError(
+                f"The {name} clip, {clip.name}, has only {counted(len(clip), 'frame')}."
+            )
 
 
 def length_notes(
@@ -36,16 +52,9 @@ def length_notes(
 
     Raises
     ------
-    InputError
-        if a clip has less than three frames.
     UsageError
         if lengths are too different where no pin says that they should be.
     """
-    for name, clip in (("body", body), ("hand", hand_clip)):
-        if len(clip) < 3:
-            raise InputError(
-                f"The {name} clip, {clip.name}, has only {counted(len(clip), 'frame')}."
-            )
     cells = band * body.duration * hand_clip.duration * fps**2
     if cells > MOST_CELLS:
         raise UsageError(
@@ -74,32 +83,46 @@ def length_notes(
     return list(notes)
 
 
-def pin_advice(
-    body: Clip, hand_clip: Clip, body_hands: Hands, hand_hands: Hands, sides: Sequence[Side]
-) -> str:
-    """Which pins would say where the shorter clip begins and ends in the longer one."""
-    ours = [hand_markers(body, body_hands, side, 2 * RATE) for side in sides]
-    theirs = [hand_markers(hand_clip, hand_hands, side, 2 * RATE) for side in sides]
-    whole = body.duration, hand_clip.duration
-    body_is_longer = whole[0] > whole[1]
-    found = locate(ours, theirs) if body_is_longer else locate(theirs, ours)
-    if found is None:
+def pin_advice(body: Clip, hand_clip: Clip, place: Place | None) -> str:
+    """Which pins would say what the clips share."""
+    if place is None or not place.shared:
         return (
             "Nothing in the longer clip resembles the shorter one: are they of the same "
             "performance? Then pin the moments at which the shorter one begins and ends (--pin)."
         )
-    ends = (0.0, whole[1 if body_is_longer else 0])
-    pairs = [(a, b) if body_is_longer else (b, a) for a, b in zip(found, ends, strict=True)]
     tolerance = round(ADVISED_TOLERANCE_S * hand_clip.origin.time_codes_per_second)
-    options = " ".join(
-        f"--pin {_time_code(body, first):g}:{_time_code(hand_clip, second):g}:{tolerance}"
-        for first, second in pairs
+    options = " ".join(f"--pin {text}:{tolerance}" for text in _pin_texts(body, hand_clip, place))
+    several = "" if place.clear else ", but other parts as much"
+    return f"{_sentence(_shared_parts(place))}{several}: if that is right, give {options}"
+
+
+def pins_of(body: Clip, hand_clip: Clip, place: Place) -> tuple[Pin, ...]:
+    """Pins at both ends of what clips share."""
+    tolerance = max(FOUND_TOLERANCE_S, place.within)
+    moments = zip(place.body, place.hand, _pin_texts(body, hand_clip, place), strict=True)
+    return tuple(Pin(ours, theirs, tolerance, name=text) for ours, theirs, text in moments)
+
+
+def part_note(body: Clip, hand_clip: Clip, place: Place) -> Problem:
+    """Note on clips of which only parts were found to belong together."""
+    options = " ".join(f"--pin {text}" for text in _pin_texts(body, hand_clip, place))
+    return Problem(
+        "found-part",
+        f"{_shared_parts(place)}, as the motion tells; if that is wrong, pin where they begin and "
+        f"end together, as in {options}",
     )
-    longer, shorter = ("body", "hand clip") if body_is_longer else ("hand clip", "body")
-    return (
-        f"The {shorter} resembles {found[0]:.1f} s to {found[1]:.1f} s of the {longer}: if that "
-        f"is right, give {options}"
-    )
+
+
+def _shared_parts(place: Place) -> str:
+    (b0, b1), (h0, h1) = place.body, place.hand
+    return f"{h0:.1f} to {h1:.1f} s of the hand clip show {b0:.1f} to {b1:.1f} s of the body"
+
+
+def _pin_texts(body: Clip, hand_clip: Clip, place: Place) -> list[str]:
+    return [
+        f"{_time_code(body, ours):g}:{_time_code(hand_clip, theirs):g}"
+        for ours, theirs in zip(place.body, place.hand, strict=True)
+    ]
 
 
 def _part(one: Pin | None, other: Pin | None) -> str:

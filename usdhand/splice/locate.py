@@ -1,79 +1,212 @@
-"""Where in a longer clip a shorter one happens: for advice on pins where a band cannot be right."""
+"""Which part of one clip another one shows: either may begin earlier, and either end later."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
+from usdhand.motion.transforms import unit
 from usdhand.splice.markers import Markers
-from usdhand.splice.phases import smoothed
+from usdhand.splice.phases import facing, smoothed
+from usdhand.splice.refine import MarkerPair
 
-RATE = 15.0
-SMOOTHING_S = 0.1
-# A place is named where clips differ by less than this share of what is usual elsewhere: on real
-# takes put one after the other a take's own place has 0.02 to 0.2, the best other one 0.25 to 0.65.
-DISTINCT = 0.25
+# Frames a second of what is compared, fewer where clips are so long that there would be too many
+# cells; with still fewer, no place is looked for.
+RATE, MOST_CELLS, LEAST_RATE = 15.0, 2e7, 4.0
+# Smoothing in frames; weight of accelerations, in shares of their RMS.
+SMOOTHING, ACCELERATIONS = 1.0, 0.5
+# Frames have no partner rather than one that differs by more than this share of what two moments
+# usually differ by: at first, and when the turn between the clips is known.
+UNLIKE, TURNED_UNLIKE = 0.6, 0.2
+ROUNDS = 2
+# A place is clear if clips differ there by less than this share of what is usual, if no other place
+# saves as much, in this share, and if they share at least as many seconds.
+DISTINCT, SECOND_BEST, LEAST_SHARED_S = 0.25, 0.6, 0.8
+# Another place is this many seconds away, at both ends.
+ELSEWHERE_S = 0.75
+# A clip goes on where a wrist moves faster than this share of its RMS speed for as many seconds.
+MOVES, GOES_ON_S = 0.3, 0.4
 
 
-def locate(longer: Sequence[Markers], shorter: Sequence[Markers]) -> tuple[float, float] | None:
-    """Seconds of the longer clip at which the shorter one begins and ends, None if nowhere.
+@dataclass(frozen=True)
+class Place:
+    """What two clips share.
 
-    The cheapest path through all of the shorter clip and any part of the longer one, from half to
-    twice as fast at every moment, over what neither direction nor size changes: how wrists bend
-    and palms tilt, and the speeds up and level in shares of their RMS.
+    Attributes
+    ----------
+    body, hand : first and last second of it
+    shared : whether they resemble each other there
+    clear : whether they do there and nowhere else
+    partial : whether a clip moves beyond it
+    within : seconds to which the ends are known
+    """
+
+    body: tuple[float, float]
+    hand: tuple[float, float]
+    shared: bool
+    clear: bool
+    partial: bool
+    within: float
+
+
+def locate(pairs: Sequence[MarkerPair]) -> Place | None:
+    """Find what body and hand clip share; None if they are too short, or too long to be searched.
+
+    The cheapest path from any beginning to any end, from half to twice as fast at every moment. At
+    first over what neither direction nor size changes: how wrists bend and palms tilt, and the
+    speeds up and level in shares of their RMS. Then the turn between the clips is known, and what
+    has a direction is compared as well.
 
     Parameters
     ----------
-    longer, shorter : markers of the same hands
+    pairs : markers of body and hand clip, of every hand
     """
-    a, b = (np.concatenate([_features(m) for m in clip], axis=1) for clip in (longer, shorter))
-    order = np.arange(len(a))
-    far = np.full(len(a), np.inf)
-    costs = [far, far, np.zeros(len(a))]  # two rows before, one before, before the first
-    starts = [np.arange(len(a), dtype=np.float64)] * 3
-    local = last = far
-    for i, row in enumerate(b):
-        last, local = local, np.sum((a - row) ** 2, axis=1)
-        if i == 0:
-            costs = [far, far, local]
-            continue
-        ways = np.stack(
-            [
-                _delayed(costs[2], 1) + local,
-                _delayed(costs[2], 2) + local,
-                _delayed(costs[1], 1) + last + local,
-            ]
-        )
-        came = np.argmin(ways, axis=0)
-        froms = np.stack([_delayed(starts[2], 1), _delayed(starts[2], 2), _delayed(starts[1], 1)])
-        costs = [costs[1], costs[2], ways[came, order]]
-        starts = [starts[1], starts[2], froms[came, order]]
-    reached = np.isfinite(costs[2])
-    if not reached.any():
+    lengths = [(len(m) - 1) / m.fps for m in pairs[0]]
+    rate = min(RATE, float(np.sqrt(MOST_CELLS / max(lengths[0] * lengths[1], 1e-9))))
+    if rate < LEAST_RATE or min(lengths) * rate < 3:
         return None
-    end = int(np.argmin(costs[2]))
-    if costs[2][end] > DISTINCT * np.median(costs[2][reached]):
-        return None
-    return float(starts[2][end] / RATE), float(end / RATE)
+    sides = [[pair[k] for pair in pairs] for k in (0, 1)]
+    ours, theirs = (_together([_turnless(m, rate) for m in s]) for s in sides)
+    found = _placed(ours, theirs, UNLIKE)
+    for _ in range(ROUNDS):
+        turned = [facing(m, np.full(len(m), -_turn(pairs, found, rate))) for m in sides[0]]
+        ours = _together([_turned(m, rate, found.rows) for m in turned])
+        theirs = _together([_turned(m, rate, found.columns) for m in sides[1]])
+        found = _placed(ours, theirs, TURNED_UNLIKE, rate)
+    body, hand = (
+        (min(first / rate, end), min(last / rate, end))
+        for (first, last), end in zip((found.rows, found.columns), lengths, strict=True)
+    )
+    shortest = min(body[1] - body[0], hand[1] - hand[0])
+    shared = found.differs < DISTINCT and shortest >= LEAST_SHARED_S
+    clear = shared and found.second < SECOND_BEST
+    partial = any(
+        _goes_on(m, first, last)
+        for side, (first, last) in zip(sides, (body, hand), strict=True)
+        for m in side
+    )
+    return Place(body, hand, shared, clear, partial, 1.0 / rate)
 
 
-def _delayed(row: Array, by: int) -> Array:
-    """A row of which every value has moved on; before its first there is no way."""
-    return np.concatenate([np.full(by, np.inf), row[:-by]])
+@dataclass(frozen=True)
+class _Found:
+    """First and last rows and columns that have partners.
+
+    ``differs`` as a share of what two moments usually differ by; ``second``: what the best path
+    elsewhere saves, as a share of what this one does.
+    """
+
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+    differs: float
+    second: float
 
 
-def _features(markers: Markers) -> Array:
-    """(frames, 7) at `RATE`: bend, tilts of the palm's axes, speeds up and level."""
-    smooth = SMOOTHING_S * markers.fps
-    count = int((len(markers) - 1) / markers.fps * RATE) + 1
-    at = np.arange(count, dtype=np.float64) * markers.fps / RATE
-    axes = markers.positions[:, [0, 3]] - markers.wrist[:, None]
-    tilts = axes[..., 1] / np.maximum(np.linalg.norm(axes, axis=-1), 1e-9)
-    velocity = smoothed(markers.wrist, smooth, 1)
-    velocity = velocity / max(float(np.sqrt(np.mean(np.sum(velocity**2, axis=-1)))), 1e-9)
+def _placed(a: Array, b: Array, unlike: float, rate: float = RATE) -> _Found:
+    from usdhand.dtw.places import free_ended
+
+    random = np.random.default_rng(0)
+    rows, columns = (random.integers(0, len(c), 4000) for c in (a, b))
+    usual = float(np.median(np.sum((a[rows] - b[columns]) ** 2, axis=1)))
+    alone = unlike * usual
+    starts, costs = free_ended(a.astype(np.float32), b.astype(np.float32), alone)
+    ends = np.concatenate(
+        [
+            np.stack([np.arange(len(a)), np.full(len(a), len(b) - 1)], axis=1),
+            np.stack([np.full(len(b), len(a) - 1), np.arange(len(b))], axis=1),
+        ]
+    )
+    saved = alone * (len(a) + len(b)) - costs
+    best = int(np.argmax(saved))
+    start, end = starts[best], ends[best]
+    away = ELSEWHERE_S * rate
+    elsewhere = (np.abs(_shift(starts) - _shift(start)) > away) & (
+        np.abs(_shift(ends) - _shift(end)) > away
+    )
+    second = float(saved[elsewhere].max()) if elsewhere.any() else 0.0
+    shared = float((end - start).sum() + 2)
+    differs = alone - float(saved[best]) / shared
+    return _Found(
+        (int(start[0]), int(end[0])),
+        (int(start[1]), int(end[1])),
+        differs / max(usual, 1e-12),
+        second / max(float(saved[best]), 1e-12),
+    )
+
+
+def _shift(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.asarray(cells[..., 0] - cells[..., 1])
+
+
+def _turn(pairs: Sequence[MarkerPair], found: _Found, rate: float) -> float:
+    """Radians about the vertical by which the hand clip turns onto the body, equation (7)."""
+    rows, columns = (np.linspace(*ends, 200) / rate for ends in (found.rows, found.columns))
+    cosine = sine = 0.0
+    for body, hand in pairs:
+        p = interpolate(body.positions, rows * body.fps)
+        q = interpolate(hand.positions, columns * hand.fps)
+        p = p - p.mean(axis=1, keepdims=True)
+        cosine += float(np.sum(p[..., 0] * q[..., 0] + p[..., 2] * q[..., 2]))
+        sine += float(np.sum(p[..., 0] * q[..., 2] - p[..., 2] * q[..., 0]))
+    return float(np.arctan2(sine, cosine))
+
+
+def _together(curves: Sequence[Array]) -> Array:
+    return np.concatenate(curves, axis=1)
+
+
+def _turnless(markers: Markers, rate: float) -> Array:
+    """(frames, 7): bend, heights of the palm's axes, speeds up and level in their RMS."""
+    smooth = SMOOTHING / rate * markers.fps
+    axes, velocity = _axes(markers), smoothed(_wrist(markers), smooth, 1)
+    velocity = velocity / _rms(velocity)
     speeds = np.stack([velocity[:, 1], np.hypot(velocity[:, 0], velocity[:, 2])], axis=1)
-    postures = smoothed(np.concatenate([markers.forearm, tilts], axis=1), smooth)
-    return np.asarray(interpolate(np.concatenate([postures, speeds], axis=1), at))
+    posture = np.concatenate([markers.forearm, axes[..., 1]], axis=1)
+    return _at_rate(np.concatenate([smoothed(posture, smooth), speeds], axis=1), markers, rate)
+
+
+def _turned(markers: Markers, rate: float, part: tuple[int, int]) -> Array:
+    """(frames, 15): bend, the palm's axes, velocity and acceleration in their RMS in a part."""
+    smooth = SMOOTHING / rate * markers.fps
+    posture = np.concatenate([markers.forearm, _axes(markers).reshape(len(markers), -1)], axis=1)
+    inside = slice(round(part[0] / rate * markers.fps), round(part[1] / rate * markers.fps) + 1)
+    velocity, acceleration = (smoothed(_wrist(markers), smooth, order) for order in (1, 2))
+    curves = [
+        smoothed(posture, smooth),
+        velocity / _rms(velocity[inside]),
+        ACCELERATIONS * acceleration / _rms(acceleration[inside]),
+    ]
+    return _at_rate(np.concatenate(curves, axis=1), markers, rate)
+
+
+def _at_rate(curves: Array, markers: Markers, rate: float) -> Array:
+    count = int((len(markers) - 1) / markers.fps * rate + 1e-6) + 1
+    return interpolate(curves, np.arange(count, dtype=np.float64) * markers.fps / rate)
+
+
+def _wrist(markers: Markers) -> Array:
+    return np.asarray(markers.positions[:, :2].mean(axis=1))
+
+
+def _axes(markers: Markers) -> Array:
+    """(frames, 2, 3) directions of the palm, towards the thumb and along it."""
+    return unit(markers.positions[:, [0, 3]] - _wrist(markers)[:, None])
+
+
+def _rms(velocity: Array) -> float:
+    return max(float(np.sqrt(np.mean(np.sum(velocity**2, axis=-1)))), 1e-9)
+
+
+def _goes_on(markers: Markers, first: float, last: float) -> bool:
+    """Whether a wrist moves before or after a part."""
+    velocity = smoothed(_wrist(markers), 0.06 * markers.fps, 1)
+    moves = np.linalg.norm(velocity, axis=-1) > MOVES * _rms(velocity)
+    seconds = np.arange(len(markers)) / markers.fps
+    return any(
+        moves[part].sum() > GOES_ON_S * markers.fps for part in (seconds < first, seconds > last)
+    )

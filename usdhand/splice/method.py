@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from usdhand.progress import Progress, Steps
 from usdhand.splice.band import checked_pins
 from usdhand.splice.confidence import Doubt, doubts, wanted_pins
 from usdhand.splice.finger_notes import frozen_notes, held_pose_notes, still_finger_notes
-from usdhand.splice.lengths import length_notes, pin_advice
+from usdhand.splice.lengths import check_frames, length_notes, part_note, pin_advice, pins_of
+from usdhand.splice.locate import RATE, Place, locate
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.merge import with_fingers, with_wrist
 from usdhand.splice.phases import smoothed
@@ -164,18 +166,29 @@ def splice(
     for pin in settings.pins:
         if pin.side is not None and pin.side not in sides:
             raise UsageError(f"Pin {pin} is for the {pin.side} hand, which is not spliced.")
-    problems = length_notes(
+    check_frames(body, hand_clip)
+    place = _place_of(body, hand_clip, body_hands, hand_hands, sides)
+    part = None if settings.pins else place()
+    problems: list[Problem] = []
+    if part and part.clear and part.partial:
+        pins = dict.fromkeys(sides, pins_of(body, hand_clip, part))
+        problems.append(part_note(body, hand_clip, part))
+    problems += length_notes(
         body,
         hand_clip,
         pins,
         settings.band[0],
         settings.fps,
-        lambda: pin_advice(body, hand_clip, body_hands, hand_hands, sides),
+        lambda: pin_advice(body, hand_clip, place()),
     )
-    found, more = _aligned_hands(body, hand_clip, body_hands, hand_hands, settings, pins, progress)
+    aligned, more = _aligned_hands(
+        body, hand_clip, body_hands, hand_hands, settings, pins, progress
+    )
+    if part and part.clear and part.partial:
+        aligned = {s: _going_on(a, part, hand_clip.duration) for s, a in aligned.items()}
     problems += more + still_finger_notes(body, hand_clip, body_hands, hand_hands, sides)
     clip, hands = body, {}
-    for side, alignment in found.items():
+    for side, alignment in aligned.items():
         warp = alignment.warp[:, 1]
         exact = _exact_frames(alignment)
         if settings.wrist == "hands":
@@ -187,6 +200,34 @@ def splice(
     problems += frozen_notes(body, hand_clip, {s: a.frozen for s, a in hands.items()})
     problems += held_pose_notes(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
     return Spliced(clip, hands, tuple(problems), settings)
+
+
+def _place_of(
+    body: Clip, hand_clip: Clip, body_hands: Hands, hand_hands: Hands, sides: Sequence[Side]
+) -> Callable[[], Place | None]:
+    """What tells, as soon as it is asked, which part the clips share."""
+
+    @cache
+    def place() -> Place | None:
+        pairs = [
+            (
+                hand_markers(body, body_hands, side, 2 * RATE),
+                hand_markers(hand_clip, hand_hands, side, 2 * RATE),
+            )
+            for side in sides
+        ]
+        return locate(pairs)
+
+    return place
+
+
+def _going_on(alignment: Alignment, part: Place, end: float) -> Alignment:
+    """What clips do not share of the hand clip comes at the body's speed."""
+    times, warp = alignment.warp.T
+    first, last = (float(np.interp(t, times, warp)) for t in part.body)
+    warp = np.where(times < part.body[0], np.maximum(first - (part.body[0] - times), 0.0), warp)
+    warp = np.where(times > part.body[1], np.minimum(last + (times - part.body[1]), end), warp)
+    return replace(alignment, warp=np.stack([times, warp], axis=1))
 
 
 def _exact_frames(alignment: Alignment) -> Array:
