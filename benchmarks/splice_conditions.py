@@ -25,8 +25,9 @@ from builders.splice_conditions import CONDITIONS, ConditionPair, condition_pair
 
 from usdhand.anatomy import Side  # noqa: E402
 from usdhand.motion.rotations import Array  # noqa: E402
+from usdhand.splice.alignment import Alignment  # noqa: E402
 from usdhand.splice.markers import hand_markers  # noqa: E402
-from usdhand.splice.method import Alignment, splice  # noqa: E402
+from usdhand.splice.method import splice  # noqa: E402
 from usdhand.splice.phases import facing, steady_turns  # noqa: E402
 from usdhand.splice.settings import PAPER, SpliceSettings  # noqa: E402
 from usdhand.splice.timing import align  # noqa: E402

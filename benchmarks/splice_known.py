@@ -26,9 +26,10 @@ from builders.known_pairs import NOISE_CM, Pair, known_pair, known_pairs  # noqa
 
 from usdhand.anatomy import Side  # noqa: E402
 from usdhand.motion.rotations import Array  # noqa: E402
+from usdhand.splice.alignment import Alignment  # noqa: E402
 from usdhand.splice.band import Band, pinned_band  # noqa: E402
 from usdhand.splice.markers import Markers, hand_markers  # noqa: E402
-from usdhand.splice.method import Alignment, Spliced, splice  # noqa: E402
+from usdhand.splice.method import Spliced, splice  # noqa: E402
 from usdhand.splice.phases import facing, smoothed, steady_turns  # noqa: E402
 from usdhand.splice.settings import PAPER, SpliceSettings  # noqa: E402
 from usdhand.splice.timing import align  # noqa: E402

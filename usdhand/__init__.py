@@ -89,7 +89,7 @@ if TYPE_CHECKING:
     from usdhand.rigs.conventions import load_conventions as load_conventions
     from usdhand.rigs.graft import Grafted as Grafted
     from usdhand.rigs.graft import add_finger_joints as add_finger_joints
-    from usdhand.splice.method import Alignment as Alignment
+    from usdhand.splice.alignment import Alignment as Alignment
     from usdhand.splice.method import Spliced as Spliced
     from usdhand.splice.settings import Pin as Pin
     from usdhand.splice.settings import SpliceSettings as SpliceSettings
@@ -164,7 +164,8 @@ _HOME = {  # module -> its public names
     "usdhand.requests.splice": "SpliceRequest",
     "usdhand.rigs.conventions": "Convention Conventions load_conventions",
     "usdhand.rigs.graft": "Grafted add_finger_joints",
-    "usdhand.splice.method": "Alignment Spliced",
+    "usdhand.splice.alignment": "Alignment",
+    "usdhand.splice.method": "Spliced",
     "usdhand.splice.settings": "Pin SpliceSettings",
     "usdhand.verbs.clips": "find_hands write_clip",
     "usdhand.verbs.compare": "compare",

@@ -34,6 +34,7 @@ class Origin:
     time_codes_per_frame : distance of two frames in time codes
     cm_per_unit : centimetres of one unit of the joints' own space
     up_axis : "Y" or "Z", of the stage
+    clock : seconds of the recording's clock at the clip's first frame, None if the file has none
     """
 
     path: Path | None = None
@@ -44,6 +45,7 @@ class Origin:
     time_codes_per_frame: float = 1.0
     cm_per_unit: float = 1.0
     up_axis: str = "Y"
+    clock: float | None = None
 
 
 def shears_of(matrices: Array) -> dict[int, Array]:

@@ -10,7 +10,8 @@ import numpy as np
 from usdhand.motion import Clip
 from usdhand.report.document import rounded
 from usdhand.report.text import written_to
-from usdhand.splice.method import Alignment, Spliced
+from usdhand.splice.alignment import Alignment
+from usdhand.splice.method import Spliced
 from usdhand.splice.settings import Pin
 
 

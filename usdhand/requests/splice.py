@@ -45,6 +45,13 @@ class SpliceRequest(Request):
         default=(),
         metavar="BODY:HAND[:TOL]",
     )
+    claps: tuple[str, ...] = option(
+        "Time codes at which both recordings show the same clap: the timing is that of their "
+        "clocks, and motion has no influence; repeatable.",
+        "--clap",
+        default=(),
+        metavar="BODY:HAND",
+    )
     edits: Path | None = option(
         "A file of edits (JSON) with more pins, as `usdhand schema --of-edits` describes it.",
         default=None,

@@ -9,7 +9,7 @@ from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.options import check_values, option
 
-Align = Literal["local", "trunk"]
+Align = Literal["local", "trunk", "timecode"]
 Directions = Literal["spread", "axes"]
 Wrist = Literal["body", "hands"]
 
@@ -96,8 +96,10 @@ class SpliceSettings:
     least_band : seconds that bands have at least: performers of short clips are off by as much as
         those of long ones
     pins : moments that belong together
+    claps : moments that both recordings show at once, as a clap; between and beyond them, time
+        runs as fast in both, and motion has no influence
     align : "local" fits a turn about the vertical wherever motions are compared, "trunk" measures
-        it from the trunks
+        it from the trunks; "timecode" takes the timing from the time codes of both clips
     wrist : whose wrist rotation the result has
     directions : of the derivatives' signs, see `usdhand.splice.phases.sign_axes`
     fps : rate at which motion is compared
@@ -119,9 +121,10 @@ class SpliceSettings:
     )
     least_band: float = 1.5
     pins: tuple[Pin, ...] = ()
+    claps: tuple[Pin, ...] = ()
     align: Align = option(
-        "How the directions of the clips are matched: by the motion around every frame, or by the "
-        "trunks.",
+        "How the clips are matched: by motion, in directions that the motion around every frame "
+        "or the trunks tell, or by the time codes of both.",
         default="local",
     )
     wrist: Wrist = option("Which clip the wrists' rotation comes from.", default="body")

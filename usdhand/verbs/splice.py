@@ -44,6 +44,7 @@ def splice_hands(
     settings: SpliceSettings | None = None,
     *,
     pins: Sequence[Pin | str] = (),
+    claps: Sequence[Pin | str] = (),
     sides: Sequence[Side] = SIDES,
     conventions: Conventions | None = None,
     progress: Progress | None = None,
@@ -54,6 +55,7 @@ def splice_hands(
     ----------
     pins : moments that belong together, besides those of the settings: `Pin` in seconds from the
         clips' first frames, or texts in time codes of their clips, see `parse_pin`
+    claps : moments that both recordings show at once, likewise, besides those of the settings
     progress : gets how many rounds of alignment are done, those of each hand, and how many there
         are; what returns False stops
 
@@ -70,8 +72,11 @@ def splice_hands(
         if ``progress`` returned False.
     """
     settings = settings or SpliceSettings()
-    own = tuple(parse_pin(p, body, hands) if isinstance(p, str) else p for p in pins)
-    settings = replace(settings, pins=(*settings.pins, *own))
+    own, heard = (
+        tuple(parse_pin(p, body, hands) if isinstance(p, str) else p for p in given)
+        for given in (pins, claps)
+    )
+    settings = replace(settings, pins=(*settings.pins, *own), claps=(*settings.claps, *heard))
     return splice(
         body,
         hands,
@@ -188,11 +193,12 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
         hand_clip,
         request.settings,
         pins=pins,
+        claps=request.claps,
         sides=sides(request.side),
         conventions=conventions,
         progress=journal.progress("splicing"),
     )
-    journal.about(f"{body} with {hands}", spliced.problems, "warning")
+    journal.about(f"{body} with {hands}", spliced.problems, "warning", "note")
     if not request.dry_run:
         lost = write_spliced(
             spliced,

@@ -53,6 +53,7 @@ def read_clip(path: Path, reading: Reading = DEFAULT) -> Clip:
         animation_path=take.name,
         time_codes_per_second=sampled.fps,
         first_time_code=sampled.first,
+        clock=sampled.first / sampled.fps,
     )
     problems = (
         *rig.problems,

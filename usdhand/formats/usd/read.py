@@ -12,6 +12,7 @@ from pxr import UsdGeom, UsdSkel
 
 from usdhand.errors import InputError
 from usdhand.formats.usd.bindings import unapplied_bindings, why_nothing_is_bound
+from usdhand.formats.usd.clock import clock_at
 from usdhand.formats.usd.curves import (
     Finish,
     Tracks,
@@ -129,6 +130,8 @@ def _animated_clip(character: Character) -> Clip:
         time_codes_per_frame=timing.step,
         animation_path=str(animation.GetPath()),
     )
+    clock, unread = clock_at(character.stage, timing.start)
+    origin = replace(origin, clock=clock)
     problems = (
         *character.problems,
         *unapplied_bindings(character.skeleton),
@@ -138,6 +141,7 @@ def _animated_clip(character: Character) -> Clip:
         *missing,
         *resampled,
         *repaired,
+        *unread,
     )
     if not SLOWEST_FPS <= timing.fps <= FASTEST_FPS:
         raise InputError(

@@ -14,8 +14,9 @@ from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.report.plots import style
 from usdhand.report.plots.style import BLACK, GREY, ORANGE, SKY, styled
+from usdhand.splice.alignment import Alignment
 from usdhand.splice.markers import Markers, hand_markers
-from usdhand.splice.method import Alignment, Spliced
+from usdhand.splice.method import Spliced
 from usdhand.splice.phases import derivative_signs, facing, in_trunk_axes, steady_turns
 from usdhand.splice.settings import SpliceSettings
 from usdhand.splice.timing import first_band
