@@ -81,10 +81,16 @@ class Declared:
         return self.default is MISSING
 
 
-def argument(help: str, *, metavar: str = "", read: Callable[[str], Any] | None = None) -> Any:  # noqa: A002
+def argument(
+    help: str,  # noqa: A002
+    *,
+    metavar: str = "",
+    read: Callable[[str], Any] | None = None,
+    default: Any = MISSING,
+) -> Any:
     """Declare a field that has its place on the command line, not a flag."""
     own = Option(help, role="argument", metavar=metavar, read=read, reported=False)
-    return field(metadata={"option": own})
+    return field(default=default, metadata={"option": own})
 
 
 def option(

@@ -32,7 +32,7 @@ def _parameter(own: Declared, inside: Declared | None, verb: str) -> click.Param
     if own.option.metavar:
         details["metavar"] = own.option.metavar
     if own.option.role == "argument":
-        return click.Argument([own.name], nargs=-1 if many else 1, required=True, **details)
+        return click.Argument([own.name], nargs=-1 if many else 1, required=own.required, **details)
     if kind is bool:
         details = {"is_flag": True}
     elif many:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,9 @@ def summary(result: Mapping[str, Any], verbose: bool) -> str:
         if hand["look_at"]:
             frames = ", ".join(f"{frame:g}" for frame in hand["look_at"])
             lines.append(f"  low agreement, consider a --pin, near time codes {frames}")
+        for p in hand["pieces"]:
+            name = Path(result["takes"][p["take"]]).name
+            lines.append(f"  {p['start']:.2f} to {p['end']:.2f} s: {name}")
         for d in hand["doubts"]:
             lines.append(
                 f"  look at {d['start']:.1f} to {d['end']:.1f} s, {side} hand: off by up to "
@@ -104,6 +108,10 @@ def _hand_data(alignment: Alignment, body: Clip) -> dict[str, Any]:
             rounded(_time_code(body, (p.start + p.end) / 2)) for p in alignment.phases if p.low
         ],
         "channels": list(alignment.channels),
+        "pieces": [
+            {"take": p.take, "start": rounded(p.start), "end": rounded(p.end)}
+            for p in alignment.pieces
+        ],
     }
 
 

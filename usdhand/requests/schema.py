@@ -35,3 +35,4 @@ class SchemaRequest(Request):
         "Print the JSON schema of reports of runs that failed as a whole.", default=False
     )
     of_edits: bool = option("Print the JSON schema of files of edits.", default=False)
+    of_takes: bool = option("Print the JSON schema of manifests of hand takes.", default=False)

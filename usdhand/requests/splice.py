@@ -28,15 +28,22 @@ class SpliceRequest(Request):
         --pin 1:1 --pin 181:403 -o talk.usda --report talk.json
 
     The hand clip of the example shows the first six seconds of the body: pins say where it begins
-    and ends. Clips that begin and end together need no pin.
+    and ends. Clips that begin and end together, or of which one clearly shows a part of the other,
+    need no pin.
     """
 
     verb: ClassVar[str] = "splice"
     verbose: ClassVar[str] = "Print every phase."
-    body: Path = argument("The clip that gets the fingers.")
-    hands: Path = argument("The clip that has them.")
+    body: Path | None = argument("The clip that gets the fingers.", default=None)
+    hands: Path | None = argument("The clip that has them.", default=None)
     output: Path = shared.output(
         "The body with the hand clip's fingers (.usda, .usdc, .usd, .usdz)."
+    )
+    manifest: Path | None = option(
+        "Several hand clips for the body instead of one: a file (JSON), as `usdhand schema "
+        "--of-takes` describes it.",
+        default=None,
+        metavar="FILE",
     )
     pins: tuple[str, ...] = option(
         "Time codes of both clips that belong together, exactly or within a tolerance in time "

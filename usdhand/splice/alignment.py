@@ -36,6 +36,15 @@ STILL_RANGE, LEAST_RANGE_SHARE = 0.1, 0.1
 Ranges = tuple[tuple[float, float], ...]
 
 
+@dataclass(frozen=True)
+class Piece:
+    """Seconds of the body from ``start`` to ``end`` with the fingers of one of several takes."""
+
+    take: int
+    start: float
+    end: float
+
+
 @displayed(
     lambda alignment: {
         "frames": len(alignment.warp),
@@ -63,6 +72,7 @@ class Alignment:
     deviation : (body frames,) standard deviation of the warp in seconds, None if nothing tells it
     taken_from : the other side, where this hand hardly moves and follows it
     channels : finger channels that were taken
+    pieces : of several takes, which one is shown when; empty for one
     """
 
     warp: Array
@@ -77,6 +87,7 @@ class Alignment:
     deviation: Array | None = None
     taken_from: Side | None = None
     channels: tuple[str, ...] = ()
+    pieces: tuple[Piece, ...] = ()
 
     @property
     def pass_lag(self) -> float:

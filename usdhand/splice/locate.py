@@ -27,6 +27,8 @@ ROUNDS = 2
 # A place is clear if clips differ there by less than this share of what is usual, if no other place
 # saves as much, in this share, and if they share at least as many seconds.
 DISTINCT, SECOND_BEST, LEAST_SHARED_S = 0.25, 0.6, 0.8
+# It has at least this share of the motion of one of them: a rest is found in many places.
+LEAST_SHARED_MOTION = 0.35
 # Another place is this many seconds away, at both ends.
 ELSEWHERE_S = 0.75
 # A clip goes on where a wrist moves faster than this share of its RMS speed for as many seconds.
@@ -83,13 +85,13 @@ def locate(pairs: Sequence[MarkerPair]) -> Place | None:
         for (first, last), end in zip((found.rows, found.columns), lengths, strict=True)
     )
     shortest = min(body[1] - body[0], hand[1] - hand[0])
-    shared = found.differs < DISTINCT and shortest >= LEAST_SHARED_S
+    motion = [
+        [_motion(m, *part) for m in side] for side, part in zip(sides, (body, hand), strict=True)
+    ]
+    most = max(min(inside / max(inside + beyond, 1e-9) for inside, beyond in own) for own in motion)
+    shared = found.differs < DISTINCT and shortest >= LEAST_SHARED_S and most >= LEAST_SHARED_MOTION
     clear = shared and found.second < SECOND_BEST
-    partial = any(
-        _goes_on(m, first, last)
-        for side, (first, last) in zip(sides, (body, hand), strict=True)
-        for m in side
-    )
+    partial = any(beyond > GOES_ON_S for own in motion for _, beyond in own)
     return Place(body, hand, shared, clear, partial, 1.0 / rate)
 
 
@@ -202,11 +204,10 @@ def _rms(velocity: Array) -> float:
     return max(float(np.sqrt(np.mean(np.sum(velocity**2, axis=-1)))), 1e-9)
 
 
-def _goes_on(markers: Markers, first: float, last: float) -> bool:
-    """Whether a wrist moves before or after a part."""
+def _motion(markers: Markers, first: float, last: float) -> tuple[float, float]:
+    """Seconds in which a wrist moves within a part, and beyond it."""
     velocity = smoothed(_wrist(markers), 0.06 * markers.fps, 1)
     moves = np.linalg.norm(velocity, axis=-1) > MOVES * _rms(velocity)
     seconds = np.arange(len(markers)) / markers.fps
-    return any(
-        moves[part].sum() > GOES_ON_S * markers.fps for part in (seconds < first, seconds > last)
-    )
+    inside = (seconds >= first) & (seconds <= last)
+    return float((moves & inside).sum() / markers.fps), float((moves & ~inside).sum() / markers.fps)

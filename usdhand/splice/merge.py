@@ -24,66 +24,72 @@ SPEED_JUMP = 0.5
 JUMP_SMOOTHING_FRAMES = 2.0
 
 
-def with_fingers(
-    body: Clip,
+def fingers_along(
     hand_clip: Clip,
-    frames: HandFrames,
     hand_frames: HandFrames,
+    names: Sequence[str],
     warp: Array,
     exact: Array | None = None,
     frozen: Sequence[tuple[float, float]] = (),
-) -> tuple[Clip, tuple[str, ...]]:
-    """The body with the fingers that the hand clip has at the warp's times.
+) -> Channels:
+    """The fingers that the hand clip has at the warp's times, of those channels that it has.
 
     Parameters
     ----------
     warp : (body frames,) seconds of the hand clip from its first frame
     exact : (body frames,) whether a frame shows this very moment, and nothing of those around it
     frozen : first and last seconds of the hand clip between which fingers that rest are bridged
-
-    Returns
-    -------
-    clip : the body; channels that one of the hands does not have are left alone
-    names : channels that were taken
     """
-    own, other = encode(body, frames), encode(hand_clip, hand_frames)
+    other = encode(hand_clip, hand_frames)
     theirs = frozenset(other.names)
-    names = tuple(name for name in own.names if name in theirs)
+    names = tuple(name for name in names if name in theirs)
     times = _times_within(warp, exact) * hand_clip.fps
     ranges = [(round(a * hand_clip.fps), round(b * hand_clip.fps)) for a, b in frozen]
     curves = bridged_smoothly(other.select(names).values, ranges)
     taken = np.mean([interpolate(curves, t) for t in times], axis=0)
-    taken = _smooth_at_speed_jumps(taken, warp, exact)
-    return decode(own.replaced(Channels(names, taken)), body, frames), names
+    return Channels(names, _smooth_at_speed_jumps(taken, warp, exact))
 
 
-def with_wrist(
-    body: Clip,
-    hand_clip: Clip,
-    hands: Hands,
-    hand_hands: Hands,
-    side: Side,
-    warp: Array,
-    exact: Array | None = None,
-) -> Clip:
-    """The body with the hand clip's rotation of the palm relative to the forearm.
+def with_fingers(body: Clip, frames: HandFrames, taken: Channels) -> Clip:
+    """The body with these channels; others are left alone."""
+    return decode(encode(body, frames).replaced(taken), body, frames)
+
+
+def wrist_along(
+    hand_clip: Clip, hands: Hands, side: Side, warp: Array, exact: Array | None = None
+) -> Array:
+    """The rotation (body frames, 4) of the palm relative to the forearm at the warp's times.
 
     Raises
     ------
     UsageError
-        if a clip has no joint above the wrist, so that nothing tells how the wrist bends.
+        if the clip has no joint above the wrist, so that nothing tells how the wrist bends.
     """
-    for clip, own in ((body, hands), (hand_clip, hand_hands)):
-        wrist = own.character.hands[side].wrist
-        if clip.skeleton.parents[wrist] < 0:
-            raise UsageError(
-                f"{clip.name}: the {side} wrist, '{clip.skeleton.joints[wrist]}', has no "
-                "forearm, so its bend is unknown. Splice the fingers alone (--wrist body)."
-            )
-    bends = _palm_to_forearm(hand_clip, hand_hands, side)
+    _check_forearm(hand_clip, hands, side)
+    bends = _palm_to_forearm(hand_clip, hands, side)
     times = _times_within(warp, exact) * hand_clip.fps
     taken = rot.mean(np.stack([interpolate_rotations(bends, t) for t in times]))
-    taken = rot.make_continuous(taken)
+    return rot.make_continuous(taken)
+
+
+def _check_forearm(clip: Clip, hands: Hands, side: Side) -> None:
+    wrist = hands.character.hands[side].wrist
+    if clip.skeleton.parents[wrist] < 0:
+        raise UsageError(
+            f"{clip.name}: the {side} wrist, '{clip.skeleton.joints[wrist]}', has no "
+            "forearm, so its bend is unknown. Splice the fingers alone (--wrist body)."
+        )
+
+
+def with_wrist(body: Clip, hands: Hands, side: Side, taken: Array) -> Clip:
+    """The body with rotations (frames, 4) of the palm relative to the forearm.
+
+    Raises
+    ------
+    UsageError
+        if the body has no joint above the wrist.
+    """
+    _check_forearm(body, hands, side)
     wrist = hands.character.hands[side].wrist
     parent = int(body.skeleton.parents[wrist])
     elbow, _ = arm_origin(body.skeleton, hands.character.hands[side])

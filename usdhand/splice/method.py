@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from usdhand.anatomy import SIDES, Hands, Side
+from usdhand.anatomy.channels import encode
 from usdhand.display import displayed
 from usdhand.errors import HandNotFoundError
 from usdhand.motion import Clip
@@ -16,7 +17,7 @@ from usdhand.problems import Problem
 from usdhand.progress import Progress
 from usdhand.splice.alignment import Alignment, aligned_hands
 from usdhand.splice.finger_notes import frozen_notes, held_pose_notes, still_finger_notes
-from usdhand.splice.merge import with_fingers, with_wrist
+from usdhand.splice.merge import fingers_along, with_fingers, with_wrist, wrist_along
 from usdhand.splice.pin_notes import contradiction_notes
 from usdhand.splice.settings import SpliceSettings
 
@@ -69,6 +70,36 @@ def splice(
         if ``progress`` returned False.
     """
     settings = settings or SpliceSettings()
+    sides = common_sides(body_hands, hand_hands)
+    aligned, problems = aligned_hands(
+        body, hand_clip, body_hands, hand_hands, sides, settings, progress
+    )
+    problems += still_finger_notes(body, hand_clip, body_hands, hand_hands, sides)
+    clip, hands = body, {}
+    for side, alignment in aligned.items():
+        warp, exact = alignment.warp[:, 1], exact_frames(alignment)
+        if settings.wrist == "hands":
+            bends = wrist_along(hand_clip, hand_hands, side, warp, exact)
+            clip = with_wrist(clip, body_hands, side, bends)
+        frames, other = body_hands.frames[side], hand_hands.frames[side]
+        names, frozen = encode(body, frames).names, alignment.frozen[1]
+        taken = fingers_along(hand_clip, other, names, warp, exact, frozen)
+        clip = with_fingers(clip, frames, taken)
+        hands[side] = replace(alignment, channels=taken.names)
+    problems += contradiction_notes(body, {s: a.contradictions for s, a in hands.items()})
+    problems += frozen_notes(body, hand_clip, {s: a.frozen for s, a in hands.items()})
+    problems += held_pose_notes(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
+    return Spliced(clip, hands, tuple(problems), settings)
+
+
+def common_sides(body_hands: Hands, hand_hands: Hands) -> list[Side]:
+    """Sides of the hands that both clips have.
+
+    Raises
+    ------
+    HandNotFoundError
+        if there are none, or no finger joint of one is in both.
+    """
     sides = [s for s in SIDES if s in body_hands.frames and s in hand_hands.frames]
     if not sides:
         there = (" and ".join(h.frames) for h in (body_hands, hand_hands))
@@ -83,26 +114,10 @@ def splice(
                 f"The {side} hands have no finger joint in common: the body has {ours}; the hand "
                 f"clip {theirs}."
             )
-    aligned, problems = aligned_hands(
-        body, hand_clip, body_hands, hand_hands, sides, settings, progress
-    )
-    problems += still_finger_notes(body, hand_clip, body_hands, hand_hands, sides)
-    clip, hands = body, {}
-    for side, alignment in aligned.items():
-        warp = alignment.warp[:, 1]
-        exact = _exact_frames(alignment)
-        if settings.wrist == "hands":
-            clip = with_wrist(clip, hand_clip, body_hands, hand_hands, side, warp, exact)
-        frames, other = body_hands.frames[side], hand_hands.frames[side]
-        clip, names = with_fingers(clip, hand_clip, frames, other, warp, exact, alignment.frozen[1])
-        hands[side] = replace(alignment, channels=names)
-    problems += contradiction_notes(body, {s: a.contradictions for s, a in hands.items()})
-    problems += frozen_notes(body, hand_clip, {s: a.frozen for s, a in hands.items()})
-    problems += held_pose_notes(body, hand_clip, {s: a.warp[:, 1] for s, a in hands.items()})
-    return Spliced(clip, hands, tuple(problems), settings)
+    return sides
 
 
-def _exact_frames(alignment: Alignment) -> Array:
+def exact_frames(alignment: Alignment) -> Array:
     """Which frames of the body an exact pin is on."""
     times = alignment.warp[:, 0]
     at = np.array([p.body for p in alignment.pins if p.tolerance == 0]) / times[1]

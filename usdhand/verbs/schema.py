@@ -13,7 +13,7 @@ from usdhand.requests.schema import SchemaRequest
 from usdhand.requests.verbs import request_class
 from usdhand.verbs.outcome import FAILURE, Journal, Outcome
 
-CHOICES = ("of_report", "of_request", "of_failure", "of_edits")
+CHOICES = ("of_report", "of_request", "of_failure", "of_edits", "of_takes")
 
 
 def run(request: SchemaRequest, journal: Journal) -> Outcome:
@@ -40,7 +40,9 @@ def _found(request: SchemaRequest) -> dict[str, Any] | None:
         return report_schema(request.of_report)
     if request.of_failure:
         return failure_schema()
-    return _schema_file("edits") if request.of_edits else None
+    if request.of_edits:
+        return _schema_file("edits")
+    return _schema_file("takes") if request.of_takes else None
 
 
 def report_schema(verb: str) -> dict[str, Any]:

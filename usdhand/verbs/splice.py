@@ -28,9 +28,11 @@ from usdhand.report.splice import splice_result, summary
 from usdhand.requests.edits import read_pins
 from usdhand.requests.shared import sides
 from usdhand.requests.splice import SpliceRequest
+from usdhand.requests.takes import TakeFile, read_manifest
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.splice.method import Spliced, splice
 from usdhand.splice.settings import Pin, SpliceSettings
+from usdhand.splice.takes import Take, splice_takes
 from usdhand.verbs.clips import find_hands, misleading_names
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -164,41 +166,65 @@ def write_spliced(
         force=force,
         inputs=inputs,
         author=author_warps(
-            clip.time_codes.tolist(), {s: a.warp[:, 1].tolist() for s, a in spliced.hands.items()}
+            clip.time_codes.tolist(),
+            {s: a.warp[:, 1].tolist() for s, a in spliced.hands.items()},
+            {
+                s: [(p.take, clip.time_code(round(p.start * clip.fps))) for p in a.pieces]
+                for s, a in spliced.hands.items()
+                if a.pieces
+            },
         ),
     )
 
 
 def run(request: SpliceRequest, journal: Journal) -> Outcome:
-    """Splice a hand clip onto a body clip."""
-    body, hands, output = request.body, request.hands, request.output
+    """Splice a hand clip, or several, onto a body clip."""
+    if request.manifest is None and (request.body is None or request.hands is None):
+        raise UsageError("Give the files BODY and HANDS, or several hand clips with --manifest.")
+    body, takes = _takes(request)
+    files = [take.hands for take in takes]
+    output, several = request.output, request.manifest is not None
     outputs = written_files(output, flatten=request.flatten)
-    check_outputs(outputs, [body, hands], request.force, USD_SUFFIXES)
+    check_outputs(outputs, [body, *files], request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
     conventions = load_conventions(*request.maps)
     clip = read_clip(body, request.skel)
-    try:
-        hand_clip = read_clip(hands, request.hands_skel)
-    except UsdHandError as error:
-        raise type(error)(str(error).replace("--skel", "--hands-skel")) from error
-    if body.resolve() == hands.resolve() and request.skel == request.hands_skel:
-        journal.warn("same-file", "body and hand clip are the same", body)
-    for read in (clip, hand_clip):
+    clips = [_hand_clip(take) for take in takes]
+    for take in takes:
+        if body.resolve() == take.hands.resolve() and request.skel == take.skel:
+            journal.warn("same-file", "body and hand clip are the same", body)
+    for read in (clip, *clips):
         journal.about(read.origin.path, read.problems, "warning")
         journal.about(read.origin.path, misleading_names(read, conventions), "warning")
-    pins = (*request.pins, *(read_pins(request.edits) if request.edits else ()))
-    spliced = splice_hands(
-        clip,
-        hand_clip,
-        request.settings,
-        pins=pins,
-        claps=request.claps,
-        sides=sides(request.side),
-        conventions=conventions,
-        progress=journal.progress("splicing"),
-    )
-    journal.about(f"{body} with {hands}", spliced.problems, "warning", "note")
+    progress, wanted = journal.progress("splicing"), sides(request.side)
+    if several:
+        given = [
+            Take(
+                hand_clip,
+                find_hands(hand_clip, conventions, [s for s in take.sides if s in wanted]),
+                replace(
+                    request.settings,
+                    pins=tuple(parse_pin(p, clip, hand_clip) for p in take.pins),
+                    claps=tuple(parse_pin(p, clip, hand_clip) for p in take.claps),
+                ),
+            )
+            for take, hand_clip in zip(takes, clips, strict=True)
+        ]
+        hands = find_hands(clip, conventions, sides(request.side))
+        spliced = splice_takes(clip, given, hands, request.settings, progress)
+    else:
+        spliced = splice_hands(
+            clip,
+            clips[0],
+            request.settings,
+            pins=takes[0].pins,
+            claps=takes[0].claps,
+            sides=sides(request.side),
+            conventions=conventions,
+            progress=progress,
+        )
+    journal.about(f"{body} with {', '.join(map(str, files))}", spliced.problems, "warning", "note")
     if not request.dry_run:
         lost = write_spliced(
             spliced,
@@ -207,24 +233,56 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
             allow_outside=request.allow_outside,
             force=request.force,
             conventions=conventions,
-            inputs=[hands],
+            inputs=files,
         )
         journal.about(output, lost, "warning", "note")
 
     def report() -> dict[str, Any]:
-        return splice_result(spliced) | {"output": None if request.dry_run else str(output)}
+        return splice_result(spliced) | {
+            "takes": [str(file) for file in files] if several else [],
+            "output": None if request.dry_run else str(output),
+        }
 
     def figures() -> dict[str, Figure]:
         ours = find_hands(clip, conventions, sides(request.side))
-        theirs = find_hands(hand_clip, conventions, sides(request.side))
-        return plotting.figures(spliced, clip, hand_clip, ours, theirs, request.settings)
+        theirs = find_hands(clips[0], conventions, sides(request.side))
+        return plotting.figures(spliced, clip, clips[0], ours, theirs, request.settings)
 
+    more = [f for f in (request.manifest, request.edits) if f is not None]
     return Outcome(
         request,
-        (body, hands, *([request.edits] if request.edits else []), *request.maps),
+        (body, *files, *more, *request.maps),
         report,
         summary,
-        settings={"pins": list(pins)},
+        settings={"pins": [p for take in takes for p in take.pins]},
         figures=figures,
         written=() if request.dry_run else (output,),
     )
+
+
+def _takes(request: SpliceRequest) -> tuple[Path, tuple[TakeFile, ...]]:
+    """The body and what goes onto it."""
+    if request.manifest is None:
+        assert request.body is not None
+        assert request.hands is not None
+        pins = (*request.pins, *(read_pins(request.edits) if request.edits else ()))
+        own = TakeFile(request.hands, request.hands_skel, pins, request.claps, SIDES)
+        return request.body, (own,)
+    if request.hands is not None:
+        raise UsageError("The hand clips are those of the manifest: give no HANDS with --manifest.")
+    if request.pins or request.claps or request.edits:
+        raise UsageError("With --manifest, pins and claps are those of its takes.")
+    if request.plots is not None:
+        raise UsageError("Plots are of one hand clip: give no --plots with --manifest.")
+    manifest = read_manifest(request.manifest)
+    body = request.body or manifest.body
+    if body is None:
+        raise UsageError(f'Give the file BODY; {request.manifest} has no "body".')
+    return body, tuple(replace(t, skel=t.skel or request.hands_skel) for t in manifest.takes)
+
+
+def _hand_clip(take: TakeFile) -> Clip:
+    try:
+        return read_clip(take.hands, take.skel)
+    except UsdHandError as error:
+        raise type(error)(str(error).replace("--skel", "--hands-skel")) from error

@@ -127,6 +127,8 @@ def retiming(report: Mapping[str, Any]) -> tuple[str, dict[Side, Array]]:
     """Hash of the hand clip of a splice, and its warps (n, 2) [body s, hand s]; "" for others."""
     if report_verb(report) != "splice" or len(report["inputs"]) < 2:
         return "", {}
+    if report.get("takes"):  # each plays in its own time
+        return "", {}
     hands = report["hands"]
     warps = {s: np.asarray(hands[s]["warp"], float) for s in SIDES if s in hands}
     return str(report["inputs"][1]["sha256"]), warps
@@ -187,8 +189,18 @@ def _splice_rows(side: str, hand: Mapping[str, Any]) -> list[dict[str, Any]]:
         }
         for d in hand["doubts"]
     ]
+    pieces = [
+        {
+            "start": float(p["start"]),
+            "end": float(p["end"]),
+            "label": str(int(p["take"]) + 1),
+            "detail": f"fingers of take {int(p['take']) + 1}",
+        }
+        for p in hand.get("pieces", [])
+    ]
     warp = np.asarray(hand["warp"], float)
     return [
+        *([{"side": side, "label": "takes", "spans": pieces, "marks": []}] if pieces else []),
         {"side": side, "label": "phases", "spans": spans, "marks": pins},
         *([{"side": side, "label": "may be off", "spans": doubts, "marks": []}] if doubts else []),
         {
