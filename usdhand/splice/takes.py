@@ -229,7 +229,7 @@ def _shown_alignment(own: Mapping[int, Alignment], shown: NDArray[np.intp]) -> A
     deviation = _chosen(deviations, shown)
 
     def take_at(seconds: float) -> int:
-        return int(shown[min(np.searchsorted(times, seconds), len(shown) - 1)])
+        return int(shown[min(int(np.searchsorted(times, seconds)), len(shown) - 1)])
 
     return Alignment(
         np.stack([times, _chosen({k: a.warp[:, 1] for k, a in own.items()}, shown)], axis=1),
