@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from usdhand.reduce.variation import Variation as Variation
     from usdhand.requests.base import Request as Request
     from usdhand.requests.check import CheckRequest as CheckRequest
+    from usdhand.requests.codec import make_request as make_request
     from usdhand.requests.compare import CompareRequest as CompareRequest
     from usdhand.requests.convert import ConvertRequest as ConvertRequest
     from usdhand.requests.convert import Edits as Edits
@@ -150,6 +151,7 @@ _HOME = {  # module -> its public names
     "usdhand.reduce.variation": "Variation",
     "usdhand.requests.base": "Request",
     "usdhand.requests.check": "CheckRequest",
+    "usdhand.requests.codec": "make_request",
     "usdhand.requests.compare": "CompareRequest",
     "usdhand.requests.convert": "ConvertRequest Edits",
     "usdhand.requests.evaluate": "EvaluateRequest",

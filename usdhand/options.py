@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
 from numbers import Integral, Real
+from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -18,7 +19,13 @@ from usdhand.errors import UsageError
 Role = Literal["argument", "option", "settings"]
 
 # Simple types in words.
-WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+WORDS: Mapping[Any, str] = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    Path: "a path",
+}
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,8 @@ class Option:
     chosen_by : field that names one of ``bases``
     reported : whether it is among the settings of a report
     written : whether it names something that a run writes
+    several : of texts that name inputs: what a folder stands for, the "files" in it, the "usd"
+        ones, or also those in the folders "below"; "" for texts that name none
     """
 
     help: str
@@ -54,6 +63,7 @@ class Option:
     chosen_by: str = ""
     reported: bool = True
     written: bool = False
+    several: Literal["", "files", "usd", "below"] = ""
 
 
 @dataclass(frozen=True)
@@ -81,15 +91,9 @@ class Declared:
         return self.default is MISSING
 
 
-def argument(
-    help: str,  # noqa: A002
-    *,
-    metavar: str = "",
-    read: Callable[[str], Any] | None = None,
-    default: Any = MISSING,
-) -> Any:
-    """Declare a field that has its place on the command line, not a flag."""
-    own = Option(help, role="argument", metavar=metavar, read=read, reported=False)
+def argument(help: str, *, default: Any = MISSING, **details: Any) -> Any:  # noqa: A002
+    """Declare a field that has its place on the command line, not a flag; see `option`."""
+    own = Option(help, role="argument", reported=False, **details)
     return field(default=default, metadata={"option": own})
 
 
@@ -178,7 +182,7 @@ def _is_of(kind: Any, value: Any) -> bool:
             and len(value) == len(inner)
             and all(_is_of(one, part) for one, part in zip(inner, value, strict=True))
         )
-    if isinstance(value, bool) or kind in (bool, str):
+    if isinstance(value, bool) or kind in (bool, str, Path):
         return isinstance(value, kind) and (kind is bool) == isinstance(value, bool)
     return isinstance(value, Real if kind is float else Integral)
 

@@ -83,6 +83,7 @@ def calls(kind: Kind, folder: Path) -> Mapping[str, Callable[[], object]]:
         "find_hands": lambda: usdhand.find_hands(clip),
         "fit_rig": lambda: usdhand.fit_rig([kind(OK)]),
         "label_agreement": lambda: usdhand.label_agreement(labelled(library)),
+        "make_request": lambda: usdhand.make_request({"verb": "check", "files": [str(OK)]}),
         "load_conventions": lambda: usdhand.load_conventions(at("map.toml")),
         "measure_library": lambda: usdhand.measure_library(library, kind(folder)),
         "parse_pin": lambda: usdhand.parse_pin("1:1", body, fingers),

@@ -17,7 +17,7 @@ from usdhand.fill.metric import FEATURES, feature_rows
 from usdhand.fill.settings import METRICS, Feature
 from usdhand.motion import forward_kinematics
 from usdhand.motion import rotations as rot
-from usdhand.requests.codec import from_data, to_data
+from usdhand.requests.codec import make_request, to_data
 
 GESTURES = sorted((SAMPLES / "gestures").glob("o*.usdc"))[:6]
 # Joint names of nobody's convention, and the tables that tell which is which.
@@ -80,7 +80,7 @@ def test_requests_keep_a_metric_of_one_s_own() -> None:
         output=Path("c.usda"),
         settings=usdhand.FillSettings(metric=own),
     )
-    assert from_data(json.loads(json.dumps(to_data(request)))) == request
+    assert make_request(json.loads(json.dumps(to_data(request)))) == request
 
 
 def renamed(clip: usdhand.Clip) -> usdhand.Clip:

@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 
 from usdhand.report.document import dumps
-from usdhand.requests.codec import from_data, to_data
+from usdhand.requests.codec import make_request, to_data
 from usdhand.verbs.outcome import FAILURE, Outcome
 from usdhand.verbs.schema import failure_schema, report_schema
 
@@ -27,7 +27,7 @@ def judged() -> Iterator[None]:
         made: dict[str, Any] = make(outcome)
         data = json.loads(dumps(made))
         validator(FAILURE if outcome.failed else data["request"]["verb"]).validate(data)
-        assert to_data(from_data(data["request"])) == data["request"]
+        assert to_data(make_request(data["request"])) == data["request"]
         return made
 
     with pytest.MonkeyPatch.context() as patch:

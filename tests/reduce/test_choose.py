@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from usdhand.anatomy.channels import Channels, Hands, is_flexion
 from usdhand.anatomy.hand import SIDES, CharacterMap
-from usdhand.errors import QualityError, UsageError
+from usdhand.errors import UsageError
 from usdhand.motion import Clip
 from usdhand.reduce.curve import Loss, error_curve
 from usdhand.reduce.errors import pca_rms
@@ -234,8 +234,6 @@ def test_the_paper_s_rules_take_no_wishes() -> None:
         for rules in ({"preset": 4}, {"range_deg": 2.0}, {"free_channels": 9, "fit": "paper"}):
             with pytest.raises(UsageError, match="--keep"):
                 _ = ReduceSettings(**wish, **rules).target  # type: ignore[arg-type]
-    with pytest.raises(QualityError, match="above 0"):
-        fitted(Target(max_error=0.0))
     with pytest.raises(UsageError, match="not possible"):
         fitted(Target(free_channels=-1))
 

@@ -8,11 +8,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from usdhand.errors import QualityError, UsageError
+from usdhand.errors import UsageError
 from usdhand.motion.rotations import Array
 from usdhand.reduce.fit import Statistics, controllers_at, fit_relations
 from usdhand.reduce.search import _errors, thresholds_for_count, thresholds_for_error
-from usdhand.reduce.settings import Fit, Thresholds
+from usdhand.reduce.settings import Fit, ReduceSettings, Thresholds
 
 FITS: tuple[Fit, ...] = ("paper", "least-squares")
 seeds = st.integers(0, 2**32 - 1)
@@ -115,6 +115,6 @@ def test_what_cannot_be_asked_for() -> None:
     statistics = Statistics.of(curves(1, 3))
     with pytest.raises(UsageError, match="-1"):
         thresholds_for_count(statistics, -1)
-    for bad in (0.0, -1.0, float("nan")):
-        with pytest.raises(QualityError, match="is not possible"):
-            thresholds_for_error(statistics, bad)
+    for bad in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(UsageError, match="is not possible"):
+            ReduceSettings(max_error=bad)

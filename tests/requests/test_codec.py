@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from usdhand.errors import UsageError, UsdHandError
 from usdhand.options import allows_none, alternatives, declared, flat
 from usdhand.requests.base import Request
-from usdhand.requests.codec import from_data, to_data
+from usdhand.requests.codec import make_request, to_data
 from usdhand.requests.fill import FillRequest
 from usdhand.requests.json_schema import request_schema
 from usdhand.requests.splice import SpliceRequest
@@ -83,7 +83,7 @@ def _built(kind: Any, own: dict[str, Any]) -> Any:
 def test_every_request_comes_back_from_json(owner: type[Request], data: st.DataObject) -> None:
     request = data.draw(_values(owner))
     text = json.dumps(to_data(request))
-    assert from_data(json.loads(text)) == request
+    assert make_request(json.loads(text)) == request
     jsonschema.validate(json.loads(text), request_schema(owner))
 
 
@@ -111,7 +111,7 @@ def fill(**more: object) -> dict[str, object]:
 
 
 def test_what_is_not_said_has_its_default_by_the_preset() -> None:
-    request = from_data(fill(preset="paper", settings={"k": 7}))
+    request = make_request(fill(preset="paper", settings={"k": 7}))
     assert isinstance(request, FillRequest)
     assert (request.settings.metric, request.settings.k) == ("euler", 7)
     assert request.side == "both"
@@ -144,20 +144,20 @@ def test_what_is_not_said_has_its_default_by_the_preset() -> None:
 )
 def test_what_is_no_request_is_refused(data: dict[str, object], words: str) -> None:
     with pytest.raises(UsageError, match=words):
-        from_data(data)
+        make_request(data)
 
 
 def test_settings_that_need_a_value_say_so() -> None:
     data = {"verb": "splice", "body": "b", "hands": "h", "output": "o"}
     with pytest.raises(UsageError, match=r"'settings.pins\[0\]' needs 'hand'"):
-        from_data({**data, "settings": {"pins": [{"body": 1.0}]}})
-    request = from_data({**data, "settings": {"pins": [{"body": 1, "hand": 2}]}})
+        make_request({**data, "settings": {"pins": [{"body": 1.0}]}})
+    request = make_request({**data, "settings": {"pins": [{"body": 1, "hand": 2}]}})
     assert isinstance(request, SpliceRequest)
     assert request.settings.pins == (Pin(1.0, 2.0),)
 
 
 def test_reports_have_the_settings_by_their_keys() -> None:
-    request = from_data(fill(settings={"k": 3}))
+    request = make_request(fill(settings={"k": 3}))
     reported = request.reported()
     assert reported["k"] == 3
     assert reported["preset"] == "default"

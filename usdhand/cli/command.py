@@ -10,9 +10,16 @@ from usdhand.cli.bar import Bar
 from usdhand.cli.console import foreseen, say, show
 from usdhand.cli.given import request_of
 from usdhand.cli.parameters import parameters
+from usdhand.errors import UsdHandError
 from usdhand.problems import Problem
 from usdhand.requests.base import Request
 from usdhand.requests.verbs import request_class
+
+
+class Crash:
+    """How the process that worked on a request ended, where another one makes its report."""
+
+    error: UsdHandError | None = None
 
 
 def command_of(verb: str) -> click.Command:
@@ -49,6 +56,8 @@ def _call(owner: type[Request]) -> None:
 
     journal = Journal(listen, bar)
     try:
+        if Crash.error is not None:
+            raise Crash.error
         outcome = run_verb(request, journal)
     except Exception as error:
         if as_json:

@@ -7,6 +7,7 @@ import signal
 import sys
 from typing import NoReturn
 
+from usdhand.errors import CrashedError, UnforeseenError, UsdHandError
 from usdhand.witness import FAULTS, crashed, died_of
 
 FORWARDED = ("SIGTERM", "SIGHUP")
@@ -33,20 +34,33 @@ def wait_for(child: int, told: int) -> NoReturn:
     opened = names.rpartition(b"\0")[0].rpartition(b"\0")[2]
     _, status = os.waitpid(child, 0)
     code = os.waitstatus_to_exitcode(status)
-    if code < 0:
-        text, code = _end(code, opened.decode(errors="backslashreplace"))
-        sys.stderr.write(text)
-        sys.stderr.flush()
+    if -code in FAULTS:
+        error = _crash(code, opened.decode(errors="backslashreplace"))
+        if "--json" in sys.argv:
+            _report(error)
+        sys.stderr.write(f"Error: {error}\n")
+        code = error.exit_code
+    elif code < 0:
+        if -code == signal.SIGKILL:
+            sys.stderr.write(f"Error: usdhand was ended by {died_of(code)}.\n")
+        code = 128 - code
+    sys.stderr.flush()
     os._exit(code)
 
 
-def _end(code: int, opened: str) -> tuple[str, int]:
-    """What to say of a child that a signal ended, and the exit code."""
+def _crash(code: int, opened: str) -> UsdHandError:
+    """What a crash means: that of a file that had been opened is the file's."""
     how = died_of(code)
-    if -code == signal.SIGKILL:
-        return f"Error: usdhand was ended by {how}.\n", 128 - code
-    if -code not in FAULTS:
-        return "", 128 - code
     if not opened:
-        return f"Error: usdhand crashed ({how}).\n", 1
-    return f"Error: {opened}: {crashed(how)}\n", 3
+        return UnforeseenError(f"usdhand crashed ({how}).")
+    return CrashedError(f"{opened}: {crashed(how)}")
+
+
+def _report(error: UsdHandError) -> NoReturn:
+    """Let the command line report the crash instead of working; it exits by itself."""
+    from usdhand.cli.command import Crash
+    from usdhand.cli.main import main
+
+    Crash.error = error
+    main()
+    sys.exit(error.exit_code)

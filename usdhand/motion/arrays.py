@@ -27,6 +27,10 @@ Quaternions = Literal["xyzw", "wxyz"]
 # pose than the first, and the other way nearer than the second. No body moves like that. Some
 # frames tell as well as all.
 TURNED_OVER_DEG, NEAR_BIND_DEG, LOOKED_AT = 120.0, 60.0, 500
+# Frames a second, and centimetres a unit, that can be meant.
+RATES, UNITS_CM = (1e-3, 1e5), (1e-6, 1e8)
+# What is larger, in the unit of the arrays, is a mistake, and products of it may overflow.
+LARGEST = 1e9
 # The bones of a hand and of a giant reach so far from the root, those of a body at least this far;
 # and one that is so many times deeper than high lies.
 REACH_CM, BODY_CM, LYING = (5.0, 400.0), 80.0, 2.0
@@ -194,16 +198,22 @@ def rate_of(fps: float) -> float:
         if it is no positive number.
     """
     number = isinstance(fps, Real) and not isinstance(fps, bool)
-    if not number or not 0.0 < fps < np.inf:
-        raise UsageError(f"fps: {fps!r} frames a second are not possible: give a number above 0.")
+    if not number or not RATES[0] <= fps <= RATES[1]:
+        raise UsageError(
+            f"fps: {fps!r} frames a second are not possible: give a number from {RATES[0]:g} to "
+            f"{RATES[1]:g}."
+        )
     return float(fps)
 
 
 def _centimetres(units: str | float) -> float:
     try:
-        return read_unit(str(units))
+        cm = read_unit(str(units))
     except ValueError as error:
         raise UsageError(f"units: {error}") from error
+    if not UNITS_CM[0] <= cm <= UNITS_CM[1]:
+        raise UsageError(f"units: no unit of length has {cm:g} cm.")
+    return cm
 
 
 def _turn(up: str) -> Array:
@@ -240,7 +250,18 @@ def _names(joints: Sequence[str]) -> list[str]:
     for number, name in enumerate(names):
         if not name or not leaf_name(name):
             raise UsageError(f"joints: number {number} has no name ({name!r}).")
+        if not _is_text(name):
+            raise UsageError(f"joints: the name of number {number} is no text ({name!r}).")
     return names
+
+
+def _is_text(name: str) -> bool:
+    """Whether every program can read a name: half a character of UTF-16 is none."""
+    try:
+        name.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _tree(names: list[str], parents: ArrayLike | None) -> tuple[tuple[str, ...], NDArray[np.intp]]:
@@ -322,9 +343,11 @@ def _array(name: str, values: Any, form: str, *shapes: tuple[int | None, ...]) -
 def _check_finite(
     name: str, values: Array, joints: Sequence[str], axis: int | tuple[int, ...] = -1
 ) -> None:
-    """Refuse values (frames, joints, n) that are not finite; ``axis`` is that of one joint's."""
+    """Refuse values (frames, joints, n) that no motion has; ``axis`` is that of one joint's."""
     if (bad := _first(~np.isfinite(values).all(axis=axis))) is not None:
         raise InputError(f"{name}: {_at(bad, joints)}: a value is not finite.")
+    if (bad := _first((np.abs(values) > LARGEST).any(axis=axis))) is not None:
+        raise InputError(f"{name}: {_at(bad, joints)}: a value is larger than {LARGEST:g}.")
 
 
 def _first(bad: ArrayLike) -> tuple[int, ...] | None:

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from usdhand.anatomy.channels import is_flexion
-from usdhand.errors import QualityError, UsageError
+from usdhand.errors import UsageError
 from usdhand.motion.rotations import Array
 from usdhand.reduce.evidence import Takes
 from usdhand.reduce.fit import SMALLEST_RANGE_DEG
@@ -42,8 +42,6 @@ def choose(evidence: Takes, target: Target, controllers: int | None, choice: Cri
     ------
     UsageError
         if the number is negative or less than what is kept, or a kept channel does not exist.
-    QualityError
-        if the largest error is not a positive number.
     """
     if target.free_channels is not None:
         return _for_count(evidence, target.free_channels, controllers, choice)
@@ -160,10 +158,6 @@ def _to_follow(search: Subsets, free: frozenset[int], controllers: int | None) -
 
 
 def _for_error(evidence: Takes, most: float, controllers: int | None, choice: Criteria) -> Model:
-    if not most > 0:
-        raise QualityError(
-            f"An RMS error of at most {most:g} degrees is not possible: give a number above 0."
-        )
     search = subsets(evidence, choice, most)
     measure, moments = search.measure, evidence.moments
 

@@ -84,8 +84,6 @@ def fit_rig(
         if a clip has fewer than two frames, or the clips' hands have different joints.
     UsageError
         if settings contradict each other.
-    QualityError
-        if the largest error that is asked for is not above 0.
     """
     encoded = sources or [h.encode(c) for c, h in zip(clips, hands, strict=True)]
     evidence = gather(zip(clips, hands, encoded, strict=True))
@@ -112,7 +110,7 @@ def fit_to(
 
     Raises
     ------
-    UsageError, QualityError
+    UsageError
         as `fit_rig`.
     """
     if (most_controllers or 1) > 1 and fit == "paper":

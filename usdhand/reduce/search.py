@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from usdhand.errors import QualityError, UsageError
+from usdhand.errors import UsageError
 from usdhand.motion.rotations import Array
 from usdhand.reduce.fit import SAME_DEG, SAME_DISTANCE, Statistics, controllers_at
 from usdhand.reduce.settings import Fit, Thresholds
@@ -47,16 +47,7 @@ def thresholds_for_error(statistics: Statistics, most: float, fit: Fit = "paper"
     """Thresholds with the fewest free channels where no channel's RMS error exceeds ``most``.
 
     Of several with equally few the one with the smallest RMS error over all channels.
-
-    Raises
-    ------
-    QualityError
-        if ``most`` is not a positive number of degrees.
     """
-    if not most > 0:
-        raise QualityError(
-            f"An RMS error of at most {most:g} degrees is not possible: give a number above 0."
-        )
     best: tuple[tuple[int, float, float], Thresholds] | None = None
     for limit, rmsds, roots in _threshold_choices(statistics):
         if statistics.std[~statistics.moving(limit)].max(initial=0.0) > most:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -137,6 +138,10 @@ class ReduceSettings:
 
     def __post_init__(self) -> None:
         check_values(self)
+        if self.max_error is not None and not 0.0 < self.max_error < math.inf:
+            raise UsageError(
+                f"A largest error of {self.max_error:g} is not possible: give a number above 0."
+            )
 
     @property
     def choice(self) -> Criteria:

@@ -67,7 +67,7 @@ def _settings(value: Any, key: str) -> dict[str, Any]:
 
 
 def named_inputs(request: Request) -> Iterator[Path]:
-    """Files and folders that a request names, those that it writes not among them."""
+    """Paths of inputs that a request names; texts that may stand for several not among them."""
     for own in declared(type(request)):
         value = getattr(request, own.name)
         if own.option.role == "settings" or own.option.written:

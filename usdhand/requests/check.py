@@ -26,6 +26,6 @@ class CheckRequest(Request):
     """
 
     verb: ClassVar[str] = "check"
-    files: tuple[str, ...] = argument("Files, folders and wildcards.")
+    files: tuple[str, ...] = argument("Files, folders and wildcards.", several="usd")
     skel: str | None = shared.skel()
     strict: bool = option("Fail on warnings too.", default=False)

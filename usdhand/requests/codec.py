@@ -22,7 +22,7 @@ def to_data(request: Request) -> dict[str, Any]:
     return {"verb": request.verb, **own}
 
 
-def from_data(data: Mapping[str, Any]) -> Request:
+def make_request(data: Mapping[str, Any]) -> Request:
     """Make a request of plain data; fields that are not there have their defaults.
 
     Raises

@@ -88,7 +88,7 @@ class ConvertRequest(Request):
     """
 
     verb: ClassVar[str] = "convert"
-    files: tuple[str, ...] = argument("Files, folders and wildcards.")
+    files: tuple[str, ...] = argument("Files, folders and wildcards.", several="files")
     output: Path | None = shared.output(
         "The file to write; its suffix tells the format.", default=None
     )

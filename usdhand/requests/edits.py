@@ -30,6 +30,11 @@ def read_pins(path: Path) -> tuple[str, ...]:
         raise InputError(f"{path}: no JSON ({error}).") from error
     if not isinstance(edits, dict) or edits.get("schema") != SCHEMA:
         raise InputError(f'{path}: not a file of edits: it has no "schema": "{SCHEMA}".')
+    if unknown := sorted(set(edits) - {"schema", "splice"}):
+        raise InputError(
+            f"{path}: unknown key '{unknown[0]}'; the pins of a splice are in \"splice\": "
+            '{"pins": [...]}.'
+        )
     section = edits.get("splice", {})
     pins = section.get("pins", []) if isinstance(section, dict) else None
     if not isinstance(pins, list) or set(section) - {"pins"}:

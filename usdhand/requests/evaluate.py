@@ -37,6 +37,7 @@ class EvaluateRequest(Request):
         default=(),
         metavar="PATH",
         reported=False,
+        several="files",
     )
     preset: Preset = option("Settings of fill; see `usdhand fill`.", default="default")
     metric: str | None = option("Metric of fill instead of the preset's.", default=None)

@@ -27,7 +27,7 @@ class InspectRequest(Request):
 
     verb: ClassVar[str] = "inspect"
     verbose: ClassVar[str] = "Print every channel."
-    files: tuple[str, ...] = argument("Files, folders and wildcards.")
+    files: tuple[str, ...] = argument("Files, folders and wildcards.", several="files")
     skel: str | None = shared.skel()
     maps: tuple[Path, ...] = shared.maps()
     plots: Path | None = shared.plots()

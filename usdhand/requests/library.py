@@ -29,7 +29,7 @@ class LibraryBuildRequest(Request):
     """
 
     verb: ClassVar[str] = "library build"
-    clips: tuple[str, ...] = argument("Clips, folders and wildcards.")
+    clips: tuple[str, ...] = argument("Clips, folders and wildcards.", several="below")
     output: Path = shared.output("The library (.usdc, .usda, .usd).")
     labels: Path | None = option(
         "Columns file, label and optionally actor; without it labels come from file names.",

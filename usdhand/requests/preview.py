@@ -55,7 +55,7 @@ class PreviewRequest(Request):
     """
 
     verb: ClassVar[str] = "preview"
-    files: tuple[str, ...] = argument("Files, folders and wildcards.")
+    files: tuple[str, ...] = argument("Files, folders and wildcards.", several="files")
     output: Path = shared.output("The page (.html).")
     reports: tuple[Path, ...] = option(
         "JSON report of fill or splice of one of the files: shows its segments, phases and pins on "

@@ -32,7 +32,7 @@ class ReduceRequest(Request):
 
     verb: ClassVar[str] = "reduce"
     verbose: ClassVar[str] = "Print every channel."
-    clips: tuple[str, ...] = argument("Clips, folders and wildcards.")
+    clips: tuple[str, ...] = argument("Clips, folders and wildcards.", several="files")
     output: Path = shared.output(
         "The rig file (.usda, .usdc, .usd, .usdz); for several clips a folder."
     )

@@ -34,5 +34,6 @@ class RerunRequest(Request):
     )
     accept_changes: bool = option("Use inputs as they are now, also changed ones.", default=False)
     report: Path | None = shared.report()
+    plots: Path | None = shared.plots()
     dry_run: bool = shared.dry_run()
     force: bool = shared.force()

@@ -22,7 +22,7 @@ def run(request: CheckRequest, journal: Journal) -> Outcome:
         try:
             result = check_result(check_file(path, request.skel))
         except UsdHandError as error:
-            journal.fail(error)
+            journal.fail(error, path)
             results.append({"path": str(path), "ok": False, "error": str(error)})
             code = max(code, error.exit_code)
             continue

@@ -17,6 +17,7 @@ from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 from usdhand.problems import Problem
 from usdhand.rigs import Conventions, map_character
+from usdhand.verbs.files import check_several
 
 
 def find_hands(
@@ -37,6 +38,7 @@ def find_hands(
     HandNotFoundError
         if there is no hand, or an ambiguous one, or none on the wanted side.
     """
+    check_several("sides", sides)
     name = clip.origin.path or clip.name
     unknown = set(sides) - set(SIDES)
     if unknown or not sides:

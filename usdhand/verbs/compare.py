@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from usdhand.errors import QualityError
+from usdhand.errors import QualityError, UsageError
 from usdhand.evaluate.compare import Comparison, compare_clips
 from usdhand.formats.files import read_clip
 from usdhand.motion import Clip
@@ -46,6 +46,8 @@ def compare(
 
 def run(request: CompareRequest, journal: Journal) -> Outcome:
     """Compare two files; exit 5 if they differ by more than ``max_rms``."""
+    if request.max_rms is not None and not request.max_rms >= 0:
+        raise UsageError(f"--max-rms {request.max_rms:g}: give a number of degrees, 0 or more.")
     conventions = load_conventions(*request.maps)
     a, b = read_clip(request.a, request.skel), read_clip(request.b, request.skel_b or request.skel)
     for clip in (a, b):
@@ -59,7 +61,7 @@ def run(request: CompareRequest, journal: Journal) -> Outcome:
             f"{most:g}."
         )
         error = QualityError(message)
-        journal.fail(error)
+        journal.fail(error, request.b)
         code = error.exit_code
     inputs = (request.a, request.b, *request.maps)
     return Outcome(request, inputs, lambda: compare_result(found), summary, exit_code=code)

@@ -314,7 +314,7 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
         if isinstance(done, UsdHandError):
             if len(jobs) == 1:
                 raise done
-            journal.fail(done)
+            journal.fail(done, job.path)
             code = max(code, done.exit_code)
             result |= {"error": str(done)}
             continue

@@ -54,7 +54,7 @@ def jobs_of(
             stem = path.stem if stems[path.stem] == 1 else path.name
             each = _each(path, stem, request.reading)
         except UsdHandError as error:
-            journal.fail(error)
+            journal.fail(error, path)
             code = max(code, error.exit_code)
             continue
         suffix = request.to or "usdc"

@@ -4,12 +4,28 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
-from usdhand.errors import InputError, UsageError
+from usdhand.errors import InputError, UsageError, UsdHandError
 from usdhand.formats.paths import MOTION_SUFFIX
-from usdhand.formats.suffixes import READABLE
+from usdhand.formats.suffixes import READABLE, USD_SUFFIXES
+from usdhand.options import declared
+from usdhand.requests.base import Request, named_inputs
+
+
+def check_several(name: str, values: object) -> None:
+    """Refuse one value where several are taken: a text would be taken for its letters.
+
+    Raises
+    ------
+    UsageError
+        if it is one.
+    """
+    if isinstance(values, (str, Path)) or not isinstance(values, Iterable):
+        one = repr(str(values)) if isinstance(values, (str, Path)) else type(values).__name__
+        raise UsageError(f"{name}: several are taken, not {one} alone: give a list.")
 
 
 def find_files(arguments: Iterable[str], suffixes: Sequence[str] = READABLE) -> list[Path]:
@@ -57,6 +73,28 @@ def _part_of(path: Path, others: Iterable[Path] = ()) -> bool:
 
     name = motion_of(path)
     return name is not None and (not others or path.with_name(name) in others)
+
+
+def inputs_of(request: Request) -> list[Path]:
+    """Files that a request names now: those in its folders and that match its wildcards, too.
+
+    What names nothing is there as it was given.
+    """
+    found: dict[Path, None] = {}
+    for own in declared(type(request)):
+        for name in getattr(request, own.name) if own.option.several else ():
+            try:
+                found.update(dict.fromkeys(EXPANDED[own.option.several]([name])))
+            except UsdHandError:
+                found[Path(name)] = None
+    return list(found | dict.fromkeys(named_inputs(request)))
+
+
+EXPANDED: Mapping[str, Callable[[Sequence[str]], list[Path]]] = {
+    "files": find_files,
+    "usd": partial(find_files, suffixes=USD_SUFFIXES),
+    "below": find_files_below,
+}
 
 
 def _named(argument: str, suffixes: Sequence[str]) -> list[Path]:

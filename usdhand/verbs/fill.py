@@ -150,6 +150,8 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
     for entry in library.damaged:
         message = f"{entry.file} of the library cannot be used: {entry.message}"
         journal.warn("damaged", message)
+    sources = [request.library.parent / entry.path for entry in library.clips]
+    check_outputs(outputs, sources, request.force, USD_SUFFIXES)
     clip = _read_body(request)
     journal.about(request.body, clip.problems, "warning")
     journal.about(request.body, misleading_names(clip, conventions), "warning")

@@ -36,7 +36,7 @@ def run(request: InspectRequest, journal: Journal) -> Outcome:
     each = partial(_inspect, skel=request.skel, conventions=conventions)
     for path, done in journal.each(each_apart(each, paths), "inspecting", len(paths)):
         if isinstance(done, UsdHandError):
-            journal.fail(done)
+            journal.fail(done, path)
             code = max(code, done.exit_code)
             found: dict[str, Any] = {"error": str(done)}
         else:
@@ -44,7 +44,7 @@ def run(request: InspectRequest, journal: Journal) -> Outcome:
             found_rigs += [rig] if rig else []
             journal.about(path, odd)  # the text tells them below each file
         if "hand_error" in found:
-            journal.fail(HandNotFoundError(found["hand_error"]))
+            journal.fail(HandNotFoundError(found["hand_error"]), path)
             code = max(code, HandNotFoundError.exit_code)
         results.append({"path": str(path)} | found)
     if request.plots is not None and len(found_rigs) != 1:

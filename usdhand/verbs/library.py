@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from numbers import Integral
 from pathlib import Path, PurePosixPath
 
 from usdhand.display import displayed
@@ -21,6 +22,7 @@ from usdhand.problems import Problem
 from usdhand.progress import Progress, each
 from usdhand.rigs import Conventions
 from usdhand.verbs.clips import find_hands
+from usdhand.verbs.files import check_several
 from usdhand.workers import each_apart
 
 
@@ -97,12 +99,17 @@ def build_library(
     Raises
     ------
     UsageError
-        if a clip is given twice.
+        if a clip is given twice, or ``jobs`` or ``keep`` is not possible.
     InputError
         if no clip can be used.
     CancelledError
         if ``progress`` returned False.
     """
+    check_several("paths", paths)
+    if isinstance(jobs, bool) or not isinstance(jobs, Integral) or jobs < 0:
+        raise UsageError(f"jobs: {jobs!r} processes are not possible: give 0 or more.")
+    if not keep >= 0:
+        raise UsageError(f"keep: {keep!r} seconds are not possible: give 0 or more.")
     files, output = [Path(path) for path in paths], Path(output)
     cutting = segmentation or Segmentation()
     kept = _kept_file(output)
@@ -133,7 +140,7 @@ def build_library(
     next_time = time.monotonic() + keep
     try:
         for done in each(results, len(tasks), progress):
-            (clips if isinstance(done, LibraryClip) else left).append(done)  # type: ignore[arg-type]
+            (clips if isinstance(done, LibraryClip) else left).append(done)
             if time.monotonic() > next_time:
                 # A tenth of the time at most: the larger the library, the rarer.
                 next_time += max(keep, 10.0 * _keep(clips[unchanged:], cutting, kept))

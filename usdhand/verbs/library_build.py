@@ -102,7 +102,9 @@ def _tell(
         message = f"{entry.file} of the old library cannot be used: {entry.message}"
         journal.warn("damaged", message)
     for entry in built.library.left_out:
-        journal.warn("left-out", f"left out: {entry.file}: {entry.message}")
+        own = entry.message.startswith(entry.file)  # the message names it
+        named = entry.message if own else f"{entry.file}: {entry.message}"
+        journal.warn("left-out", f"left out: {named}", entry.file)
     if built.removed:
         journal.warn("removed", _what_is_removed(built.removed))
     if built.unmatched:

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from usdhand.display import displayed
 from usdhand.errors import UsdHandError
+from usdhand.formats.dependencies import with_dependencies
 from usdhand.problems import Problem, Severity
 from usdhand.progress import each
 from usdhand.report.document import document, dumps
 from usdhand.report.text import problem_data
-from usdhand.requests.base import Request, named_inputs
+from usdhand.requests.base import Request
+from usdhand.verbs.files import inputs_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,7 +136,9 @@ class Outcome:
             "problems": [{"file": p.file, **problem_data(p)} for p in self.problems],
         }
         name = FAILURE if self.failed else ""
-        return document(self.request, self.inputs, settings, self.result, name) | {"outcome": own}
+        # A file that ended the run is not opened once more.
+        inputs = self.inputs if self.failed else with_dependencies(self.inputs)
+        return document(self.request, inputs, settings, self.result, name) | {"outcome": own}
 
     def to_json(self) -> str:
         """Return the report as text."""
@@ -147,12 +151,14 @@ class Outcome:
 
 def failed(request: Request, journal: Journal, error: UsdHandError) -> Outcome:
     """What to report of a run that an error ended: its problems, and the error as the last one."""
+    inputs, message = inputs_of(request), str(error)
+    file = next((str(path) for path in inputs if str(path) in message), "")
     return Outcome(
         request,
-        tuple(named_inputs(request)),
+        tuple(inputs),
         dict,
         lambda *_: "",
-        problems=(*journal.problems, Problem(error.code, str(error), severity="error")),
+        problems=(*journal.problems, Problem(error.code, message, severity="error", file=file)),
         exit_code=error.exit_code,
         failed=True,
     )

@@ -33,7 +33,7 @@ from usdhand.report.preview.summary import preview_result, summary
 from usdhand.requests.preview import PreviewRequest, PreviewSettings
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.verbs.clips import find_hands
-from usdhand.verbs.files import find_files
+from usdhand.verbs.files import check_several, find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
 PAGE_SUFFIXES = (".html", ".htm")
@@ -84,6 +84,8 @@ def preview_clips(
     UsageError
         if there is nothing to show, or a report belongs to none of the files.
     """
+    for name, several in (("clips", clips), ("reports", reports), ("figures", figures)):
+        check_several(name, several)
     if not clips:
         raise UsageError("There is nothing to show: give a file.")
     settings = settings or PreviewSettings()

@@ -33,7 +33,7 @@ from usdhand.requests.reduce import ReduceRequest
 from usdhand.requests.shared import sides
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.verbs.clips import find_hands
-from usdhand.verbs.files import find_files
+from usdhand.verbs.files import check_several, find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
 
@@ -66,9 +66,8 @@ def reduce_hands(
     InputError
         if a clip has one frame, or the clips' hands have different joints, so that no rig can be
         fitted to them.
-    QualityError
-        if the largest error that is asked for is not above 0.
     """
+    check_several("clips", clips)
     settings = settings or ReduceSettings()
     if not clips:
         raise UsageError("There is no clip to reduce.")
@@ -183,9 +182,8 @@ def fit_rig(
         if a clip has no hands.
     InputError
         if there is no clip, one has a single frame, or their hands have different joints.
-    QualityError
-        if the largest error that is asked for is not above 0.
     """
+    check_several("clips", clips)
     values = (clip if isinstance(clip, Clip) else read_clip(clip) for clip in clips)
     evidence = gather(_encoded(values, conventions, sides))
     return fit_evidence(evidence, settings or ReduceSettings())

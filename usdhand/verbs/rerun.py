@@ -13,8 +13,9 @@ from usdhand.inputs import read_json
 from usdhand.problems import Problem, listed
 from usdhand.report.document import SCHEMA_VERSION
 from usdhand.requests.base import Request
-from usdhand.requests.codec import from_data
+from usdhand.requests.codec import make_request
 from usdhand.requests.rerun import RerunRequest
+from usdhand.verbs.files import inputs_of
 from usdhand.verbs.outcome import Journal, Outcome
 from usdhand.verbs.run import run_verb
 
@@ -24,6 +25,7 @@ def run(request: RerunRequest, journal: Journal) -> Outcome:
     report = _read(request.report_file)
     asked = _changed(_request(request.report_file, report), request)
     changed, missing = _changes(report)
+    changed += _new(asked, report)
     if missing:
         raise InputError(
             f"{request.report_file}: {listed(missing)} cannot be found from here. Go to the folder "
@@ -31,18 +33,20 @@ def run(request: RerunRequest, journal: Journal) -> Outcome:
         )
     if changed and not request.accept_changes:
         raise InputError(
-            f"{request.report_file}: {listed(changed)} changed since. Give --accept-changes to "
-            "take the inputs as they are now."
+            f"{request.report_file}: {listed(changed)} changed since, or new there. Give "
+            "--accept-changes to take the inputs as they are now."
         )
     for path in changed:
-        journal.tell(Problem("changed-input", "it has changed since the report", file=path))
+        journal.tell(
+            Problem("changed-input", "it has changed since the report, or is new", file=path)
+        )
     return run_verb(asked, journal)
 
 
 def _request(path: Path, report: Mapping[str, Any]) -> Request:
     """The request of a report; what is wrong with it is the file's fault."""
     try:
-        asked = from_data(report["request"])
+        asked = make_request(report["request"])
     except UsageError as error:
         raise InputError(f"{path}: the request of this report cannot be run. {error}") from error
     if isinstance(asked, RerunRequest):
@@ -85,7 +89,12 @@ def _why_none(value: object) -> str:
 def _changed(asked: Request, request: RerunRequest) -> Request:
     """The request with what is to be otherwise this time."""
     own = {f.name for f in fields(asked)}
-    wanted = {"report": request.report, "force": request.force, "dry_run": request.dry_run}
+    wanted = {
+        "report": request.report,
+        "plots": request.plots,
+        "force": request.force,
+        "dry_run": request.dry_run,
+    }
     if request.output is not None:
         wanted["output"] = request.output
     for name, value in wanted.items():
@@ -93,6 +102,18 @@ def _changed(asked: Request, request: RerunRequest) -> Request:
             flag = "--" + name.replace("_", "-")
             raise UsageError(f"'{asked.verb}' has no {flag}, so it cannot be given to rerun.")
     return replace(asked, **{name: value for name, value in wanted.items() if name in own})
+
+
+def _new(asked: Request, report: Mapping[str, Any]) -> list[str]:
+    """Files that folders and wildcards of the request stand for now, and did not then."""
+    then = {Path(str(entry.get("path"))) for entry in report["inputs"]}
+    output = getattr(asked, "output", None)
+    now = [path for path in inputs_of(asked) if path not in then and path.is_file()]
+    return [str(path) for path in now if output is None or not _same(path, output)]
+
+
+def _same(a: Path, b: Path) -> bool:
+    return a.exists() and b.exists() and a.samefile(b)
 
 
 def _changes(report: Mapping[str, Any]) -> tuple[list[str], list[str]]:

@@ -11,8 +11,10 @@ from typing import Any
 from usdhand.formats.atomic import written_beside
 from usdhand.formats.output import check_output
 from usdhand.problems import Problem
+from usdhand.progress import Steps
 from usdhand.report.plots.style import write_plots
 from usdhand.requests.base import Request
+from usdhand.verbs.files import inputs_of
 from usdhand.verbs.outcome import Journal, Outcome, Watch
 
 
@@ -42,16 +44,19 @@ def run_verb(request: Request, journal: Journal) -> Outcome:
     """Do what a request asks for, on a journal that is there; see `run`."""
     report, force = getattr(request, "report", None), getattr(request, "force", False)
     if report is not None:
-        check_output(report, (), force, (".json",))
+        check_output(report, inputs_of(request), force, (".json",))
     module = importlib.import_module(f"usdhand.verbs.{request.verb.replace(' ', '_')}")
     verb: Callable[[Any, Journal], Outcome] = module.run
+    Steps(1, journal.progress(request.verb))  # whoever watches may stop any verb
     outcome = verb(request, journal)
     written = tuple(_with_parts(outcome.written))
     outcome = replace(outcome, written=written, problems=tuple(journal.problems))
     if report is not None and outcome.request is request:
-        _write(report, outcome.to_json(), force)
+        check_output(report, outcome.inputs, force, (".json",))
+        with written_beside(report) as temporary:
+            temporary.write_text(outcome.to_json() + "\n", encoding="utf-8")
     folder = getattr(request, "plots", None)
-    if folder is not None and outcome.figures is not None:
+    if folder is not None and outcome.figures is not None and outcome.request is request:
         write_plots(folder, outcome.figures(), force)
         outcome = replace(outcome, drawn=folder)
     return outcome
@@ -66,9 +71,3 @@ def _with_parts(written: Sequence[Path]) -> Iterator[Path]:
 
             if crate := own_crate(path):
                 yield crate
-
-
-def _write(path: Path, text: str, force: bool) -> None:
-    check_output(path, (), force, (".json",))
-    with written_beside(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")

@@ -224,7 +224,7 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
             conventions=conventions,
             progress=progress,
         )
-    journal.about(f"{body} with {', '.join(map(str, files))}", spliced.problems, "warning", "note")
+    journal.about(body, spliced.problems, "warning", "note")
     if not request.dry_run:
         lost = write_spliced(
             spliced,
