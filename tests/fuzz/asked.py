@@ -48,7 +48,7 @@ def _asked(kind: str, file: Path, seeds: Path) -> tuple[list[Request], list[Requ
         filling = FillRequest(body=seeds / "body.usdc", library=file, output=usda, replace=True)
         return [LibraryInfoRequest(library=file)], [filling, EvaluateRequest(library=file, k=1)]
     checked: list[Request] = [CheckRequest(files=(name,))] if kind in USD else []
-    return [InspectRequest(files=(name,))], [*_of_clip(file, seeds), *checked]
+    return [], [*_of_clip(file, seeds), *checked]
 
 
 def _of_rig(file: Path, seeds: Path, usda: Path) -> list[Request]:
@@ -69,6 +69,8 @@ def _of_clip(file: Path, seeds: Path) -> list[Request]:
     usda, usdc, usdz = (folder / f"out.{suffix}" for suffix in ("usda", "usdc", "usdz"))
     sound, library = seeds / "s.usdc", seeds / "library.usdc"
     return [
+        InspectRequest(files=(name,)),
+        InspectRequest(files=(name,)),
         ConvertRequest(files=(name,), output=usda),
         ConvertRequest(files=(name,), output=folder / "out.bvh"),
         ConvertRequest(files=(name,), output=folder / "out.glb"),

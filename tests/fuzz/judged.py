@@ -92,8 +92,10 @@ def _not_finite(path: Path, source: Path) -> Iterator[str]:
     elif path.suffix == ".glb":
         yield from _in_glb(path.read_bytes())
     elif path.suffix in (".usda", ".usdc", ".usdz"):
-        own = {} if source.suffix not in (".usda", ".usdc", ".usdz") else dict(_in_usd(source))
-        yield from (place for place, where in _in_usd(path) if where not in own.values())
+        found = list(_in_usd(path))
+        of_usd = found and source.suffix in (".usda", ".usdc", ".usdz")
+        own = {name for _, name in _in_usd(source)} if of_usd else set()
+        yield from (place for place, name in found if name not in own)
 
 
 def _in_usd(path: Path) -> Iterator[tuple[str, str]]:

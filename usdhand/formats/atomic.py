@@ -36,12 +36,9 @@ def written_beside(output: Path) -> Iterator[Path]:
     """
     with _work_on(output) as (start, _):
         temporary = start.with_name(f"{start.name}{output.suffix}")
-        try:
-            yield temporary
-            _to_disk(temporary)
-            os.replace(temporary, output)  # noqa: PTH105  (atomic on every system)
-        finally:
-            temporary.unlink(missing_ok=True)
+        yield temporary
+        _to_disk(temporary)
+        os.replace(temporary, output)  # noqa: PTH105  (atomic on every system)
 
 
 @dataclass(frozen=True)
@@ -92,18 +89,15 @@ def pair_written_beside(output: Path, part: Path) -> Iterator[Pair]:
     """
     with _work_on(output) as (start, lock):
         pair = Pair.at(start, output, part)
-        try:
-            yield pair
-            for path in (pair.part, pair.interim, pair.final):
-                _to_disk(path)
-            _same_file(pair.part, pair.spare)
-            lock.write_text(f"{output.name}\n{part.name}\n", encoding="utf-8")
-            _to_disk(lock)
-            os.replace(pair.interim, output)  # noqa: PTH105
-        finally:
-            pair.finish(output, part)
-            for path in (pair.interim, pair.final, pair.spare, pair.part):
-                path.unlink(missing_ok=True)
+        yield pair
+        for path in (pair.part, pair.interim, pair.final):
+            _to_disk(path)
+        _same_file(pair.part, pair.spare)
+        lock.write_text(f"{output.name}\n{part.name}\n", encoding="utf-8")
+        _to_disk(lock)
+        os.replace(pair.interim, output)  # noqa: PTH105
+        pair.finish(output, part)
+        pair.part.unlink()
 
 
 def _same_file(source: Path, target: Path) -> None:
@@ -122,8 +116,13 @@ def _work_on(output: Path) -> Iterator[tuple[Path, Path]]:
     start = output.with_name(f"{PREFIX}{os.getpid()}.{next(_numbers)}.tmp")
     lock = start.with_name(f"{start.name}.lock")
     try:
-        with ended_by_exception(), _locked(lock):
-            yield start, lock
+        with _locked(lock):
+            try:
+                with ended_by_exception():
+                    yield start, lock
+            except BaseException:
+                _clear(lock)
+                raise
     except OSError as error:
         raise OutputError(f"{output}: cannot be written ({error.strerror or error}).") from error
 
@@ -137,20 +136,22 @@ def tidy(folder: Path) -> None:
         try:
             with lock.open("rb") as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                start = lock.with_suffix("")
-                _finish(start, file.read(MOST_NAMES))
-                for path in folder.glob(f"{start.name}*"):
-                    shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+                _clear(lock)
         except OSError:  # its program is at work, or it is not ours to remove
             continue
 
 
-def _finish(start: Path, names: bytes) -> None:
-    """Do what was left to be done of a pair; ``names`` are those of its files."""
-    names_of = os.fsdecode(names).splitlines()
-    if len(names_of) == 2 and all(Path(name).name == name for name in names_of):
-        output, part = (start.with_name(name) for name in names_of)
-        Pair.at(start, output, part).finish(output, part)
+def _clear(lock: Path) -> None:
+    """Do what was left to be done, and remove temporary files; their lock last."""
+    start = lock.with_suffix("")
+    if lock.exists():
+        with lock.open("rb") as file:
+            names = os.fsdecode(file.read(MOST_NAMES)).splitlines()
+        if len(names) == 2 and all(Path(name).name == name for name in names):
+            output, part = (lock.with_name(name) for name in names)
+            Pair.at(start, output, part).finish(output, part)
+    for path in sorted(lock.parent.glob(f"{start.name}*"), key=lambda p: p == lock):
+        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -158,6 +159,7 @@ def _locked(path: Path) -> Iterator[None]:
     """Keep a lock as long as this process lives; whoever gets it later may tidy up."""
     if fcntl is None:
         yield
+        path.unlink(missing_ok=True)
         return
     while True:
         file = path.open("wb")
@@ -169,10 +171,8 @@ def _locked(path: Path) -> Iterator[None]:
             break
         file.close()  # somebody tidied it up before it was locked
     with file:
-        try:
-            yield
-        finally:
-            path.unlink(missing_ok=True)
+        yield
+        path.unlink(missing_ok=True)
 
 
 def _to_disk(path: Path) -> None:

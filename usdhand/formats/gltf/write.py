@@ -21,6 +21,7 @@ from usdhand.errors import InputError
 from usdhand.formats.gltf.document import BINARY_CHUNK, JSON_CHUNK, MAGIC
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
+from usdhand.motion.plausible import LARGEST
 from usdhand.motion.rotations import Array
 from usdhand.motion.transforms import decompose_trs
 from usdhand.problems import Problem, counted
@@ -59,7 +60,7 @@ def write_clip(clip: Clip, path: Path) -> tuple[Problem, ...]:
     times, problems = _times(clip)
     numbers = _Numbers()
     rest = _rest(clip.skeleton)
-    inverse_bind = numbers.add(_inverse_bind(clip.skeleton), INVERSE_BIND)
+    inverse_bind = numbers.add(_inverse_bind(clip), INVERSE_BIND)
     animation = _animation(clip, times, rest, numbers)
     joints = range(1, len(clip.skeleton) + 1)
     name = clip.name or "Armature"
@@ -143,12 +144,29 @@ def _rest(skeleton: Skeleton) -> _Rest:
     return _Rest(rotation, translation, scale)
 
 
-def _inverse_bind(skeleton: Skeleton) -> Array:
-    """Inverse bind matrices (joints, 16) in metres, column by column."""
-    bind = skeleton.bind.copy()
+def _inverse_bind(clip: Clip) -> Array:
+    """Inverse bind matrices (joints, 16) in metres, column by column.
+
+    Raises
+    ------
+    InputError
+        if a bind transform has no inverse in single precision.
+    """
+    bind = clip.skeleton.bind.copy()
     bind[:, :3, 3] *= METRES
-    inverse = np.linalg.inv(bind)
+    inverse = np.full_like(bind, np.nan)
+    for joint, matrix in enumerate(bind):
+        try:
+            inverse[joint] = np.linalg.inv(matrix)
+        except np.linalg.LinAlgError:
+            continue
     inverse[:, 3] = [0.0, 0.0, 0.0, 1.0]
+    flat = np.flatnonzero(~(np.abs(inverse) <= LARGEST).all(axis=(1, 2)))
+    if len(flat):
+        raise InputError(
+            f"{clip.origin.path or clip.name}: joint {clip.skeleton.joints[flat[0]]} has a bind "
+            "transform without a usable inverse, which glTF needs. Give the joint a size above 0."
+        )
     return np.asarray(inverse.swapaxes(1, 2).reshape(-1, 16))
 
 

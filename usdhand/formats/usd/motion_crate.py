@@ -97,15 +97,19 @@ def other_motion(layer: Sdf.Layer) -> str | None:
 
 
 def _heavy(layer: Sdf.Layer) -> list[Sdf.Path]:
+    """Attributes for the crate. Value clips of the layer would win over them there."""
     found: list[Sdf.Path] = []
+    clipped: list[Sdf.Path] = []
 
     def look(path: Sdf.Path) -> None:
-        spec = layer.GetAttributeAtPath(path) if path.IsPropertyPath() else None
-        if spec is not None and _is_heavy(layer, spec):
+        spec = layer.GetObjectAtPath(path)
+        if isinstance(spec, Sdf.PrimSpec) and spec.HasInfo("clips"):
+            clipped.append(path)
+        if isinstance(spec, Sdf.AttributeSpec) and _is_heavy(layer, spec):
             found.append(path)
 
     layer.Traverse(Sdf.Path.absoluteRootPath, look)
-    return sorted(found)
+    return sorted(p for p in found if not any(p.HasPrefix(above) for above in clipped))
 
 
 def _is_heavy(layer: Sdf.Layer, spec: Sdf.AttributeSpec) -> bool:

@@ -93,7 +93,10 @@ def placed_skeleton(
 
 
 def _matrices(value: object, count: int, scale: float) -> Array | None:
-    matrices = np.asarray(value if value is not None else [], dtype=np.float64)
+    try:
+        matrices = np.asarray(value if value is not None else [], dtype=np.float64)
+    except (TypeError, ValueError):  # of another type
+        return None
     if matrices.shape != (count, 4, 4) or not np.isfinite(matrices).all():
         return None
     if (np.abs(np.linalg.det(matrices[:, :3, :3])) < 1e-12).any():
