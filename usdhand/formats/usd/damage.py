@@ -60,7 +60,7 @@ def damage_refused(path: str | Path) -> Iterator[None]:
         except MemoryError as error:
             raise _damaged(path, "a value is larger than the memory") from error
         except TypeError as error:
-            if "to_python" not in str(error):
+            if not any(name in str(error) for name in ("to_python", "UnregisteredValue")):
                 raise
             raise _damaged(path, "a value is of no known type") from error
 
