@@ -24,6 +24,14 @@ SMOOTHING, ACCELERATIONS = 1.0, 0.5
 # usually differ by: at first, and when the turn between the clips is known.
 UNLIKE, TURNED_UNLIKE = 0.6, 0.2
 ROUNDS = 2
+# A frame rests if no wrist is faster than this share of its RMS speed, and then has no partner for
+# this share of what others cost.
+RESTS, REST = 0.2, 0.3
+# Before and after what is shared it has none for slightly less, so that nothing ends with a rest.
+LEFT_OUT_REST = 0.29
+# Clips do not begin or end together if what is left out then would cost as much more, in shares of
+# what it costs alone: a pause that was taken for motion does not.
+SPARED = 0.6
 # A place is clear if clips differ there by less than this share of what is usual, if no other place
 # saves as much, in this share, and if they share at least as many seconds.
 DISTINCT, SECOND_BEST, LEAST_SHARED_S = 0.25, 0.6, 0.8
@@ -32,7 +40,7 @@ LEAST_SHARED_MOTION = 0.35
 # Another place is this many seconds away, at both ends.
 ELSEWHERE_S = 0.75
 # A clip goes on where a wrist moves faster than this share of its RMS speed for as many seconds.
-MOVES, GOES_ON_S = 0.3, 0.4
+MOVES, GOES_ON_S = 0.3, 0.7
 
 
 @dataclass(frozen=True)
@@ -74,12 +82,13 @@ def locate(pairs: Sequence[MarkerPair]) -> Place | None:
         return None
     sides = [[pair[k] for pair in pairs] for k in (0, 1)]
     ours, theirs = (_together([_turnless(m, rate) for m in s]) for s in sides)
-    found = _placed(ours, theirs, UNLIKE)
+    rests = [_rests(s, rate, len(c)) for s, c in zip(sides, (ours, theirs), strict=True)]
+    found = _placed((ours, theirs), rests, UNLIKE, rate)
     for _ in range(ROUNDS):
         turned = [facing(m, np.full(len(m), -_turn(pairs, found, rate))) for m in sides[0]]
         ours = _together([_turned(m, rate, found.rows) for m in turned])
         theirs = _together([_turned(m, rate, found.columns) for m in sides[1]])
-        found = _placed(ours, theirs, TURNED_UNLIKE, rate)
+        found = _placed((ours, theirs), rests, TURNED_UNLIKE, rate)
     body, hand = (
         (min(first / rate, end), min(last / rate, end))
         for (first, last), end in zip((found.rows, found.columns), lengths, strict=True)
@@ -91,7 +100,9 @@ def locate(pairs: Sequence[MarkerPair]) -> Place | None:
     most = max(min(inside / max(inside + beyond, 1e-9) for inside, beyond in own) for own in motion)
     shared = found.differs < DISTINCT and shortest >= LEAST_SHARED_S and most >= LEAST_SHARED_MOTION
     clear = shared and found.second < SECOND_BEST
-    partial = any(beyond > GOES_ON_S for own in motion for _, beyond in own)
+    partial = found.spared > SPARED and any(
+        beyond > GOES_ON_S for own in motion for _, beyond in own
+    )
     return Place(body, hand, shared, clear, partial, 1.0 / rate)
 
 
@@ -100,30 +111,38 @@ class _Found:
     """First and last rows and columns that have partners.
 
     ``differs`` as a share of what two moments usually differ by; ``second``: what the best path
-    elsewhere saves, as a share of what this one does.
+    elsewhere saves, as a share of what this one does; ``spared``: what all of both clips would cost
+    more, as a share of what is left out.
     """
 
     rows: tuple[int, int]
     columns: tuple[int, int]
     differs: float
     second: float
+    spared: float
 
 
-def _placed(a: Array, b: Array, unlike: float, rate: float = RATE) -> _Found:
-    from usdhand.dtw.places import free_ended
+def _placed(
+    curves: tuple[Array, Array], rests: Sequence[NDArray[np.bool_]], unlike: float, rate: float
+) -> _Found:
+    from usdhand.dtw.places import NEVER, free_ended
 
+    a, b = (c.astype(np.float32) for c in curves)
     random = np.random.default_rng(0)
     rows, columns = (random.integers(0, len(c), 4000) for c in (a, b))
     usual = float(np.median(np.sum((a[rows] - b[columns]) ** 2, axis=1)))
     alone = unlike * usual
-    starts, costs = free_ended(a.astype(np.float32), b.astype(np.float32), alone)
+    waits = [np.where(r, REST * alone, NEVER) for r in rests]
+    unmatched = [np.where(r, LEFT_OUT_REST * alone, alone) for r in rests]
+    starts, costs = free_ended(a, b, *waits, *unmatched)
     ends = np.concatenate(
         [
             np.stack([np.arange(len(a)), np.full(len(a), len(b) - 1)], axis=1),
             np.stack([np.full(len(b), len(a) - 1), np.arange(len(b))], axis=1),
         ]
     )
-    saved = alone * (len(a) + len(b)) - costs
+    everything = float(unmatched[0].sum() + unmatched[1].sum())
+    saved = everything - costs
     best = int(np.argmax(saved))
     start, end = starts[best], ends[best]
     away = ELSEWHERE_S * rate
@@ -131,13 +150,19 @@ def _placed(a: Array, b: Array, unlike: float, rate: float = RATE) -> _Found:
         np.abs(_shift(ends) - _shift(end)) > away
     )
     second = float(saved[elsewhere].max()) if elsewhere.any() else 0.0
-    shared = float((end - start).sum() + 2)
-    differs = alone - float(saved[best]) / shared
+    parts = [slice(int(start[k]), int(end[k]) + 1) for k in (0, 1)]
+    inside = sum(float(u[p].sum()) for u, p in zip(unmatched, parts, strict=True))
+    frames = float((end - start).sum() + 2)
+    # What all of both clips costs, beside the best place, for what of them that one leaves out.
+    whole = [np.full(len(c), 1e6 * alone) for c in (a, b)]
+    together = float(free_ended(a, b, *waits, *whole)[1][len(a) - 1])
+    left_out = everything - inside
     return _Found(
         (int(start[0]), int(end[0])),
         (int(start[1]), int(end[1])),
-        differs / max(usual, 1e-12),
+        (inside - float(saved[best])) / frames / max(usual, 1e-12),
         second / max(float(saved[best]), 1e-12),
+        (together - float(costs[best])) / max(left_out, 1e-12),
     )
 
 
@@ -186,6 +211,16 @@ def _turned(markers: Markers, rate: float, part: tuple[int, int]) -> Array:
     return _at_rate(np.concatenate(curves, axis=1), markers, rate)
 
 
+def _rests(hands: Sequence[Markers], rate: float, count: int) -> NDArray[np.bool_]:
+    """(frames,) whether no wrist moves."""
+    slow = np.ones(count, bool)
+    for m in hands:
+        velocity = smoothed(_wrist(m), SMOOTHING / rate * m.fps, 1)
+        share = np.linalg.norm(velocity, axis=-1, keepdims=True) / _rms(velocity)
+        slow &= _at_rate(share, m, rate)[:, 0] < RESTS
+    return slow
+
+
 def _at_rate(curves: Array, markers: Markers, rate: float) -> Array:
     count = int((len(markers) - 1) / markers.fps * rate + 1e-6) + 1
     return interpolate(curves, np.arange(count, dtype=np.float64) * markers.fps / rate)
@@ -206,7 +241,7 @@ def _rms(velocity: Array) -> float:
 
 def _motion(markers: Markers, first: float, last: float) -> tuple[float, float]:
     """Seconds in which a wrist moves within a part, and beyond it."""
-    velocity = smoothed(_wrist(markers), 0.06 * markers.fps, 1)
+    velocity = smoothed(_wrist(markers), 0.12 * markers.fps, 1)
     moves = np.linalg.norm(velocity, axis=-1) > MOVES * _rms(velocity)
     seconds = np.arange(len(markers)) / markers.fps
     inside = (seconds >= first) & (seconds <= last)
