@@ -102,6 +102,7 @@ def main() -> None:
     heads = (*cases, "mean")
     print(f"{len(bodies['takes'])} takes and {len(bodies['gestures'])} gestures.\n")
     for module, name, values in (
+        (relate, "LEAST_SHARE", (0.0, 0.25, 0.5, 1.0)),
         (relate, "ALIKE", (1.0, 1.02**2, 1.05**2)),
         (relate, "WORTHWHILE", (0.0, 0.003, 0.01, 0.03)),
     ):

@@ -1,6 +1,6 @@
 """What reduction loses on a folder of takes, as Markdown tables for the documentation.
 
-    python benchmarks/reduce_takes.py [--data FOLDER] [--others FOLDER_OR_FILE ...]
+    python benchmarks/reduce_takes.py [--data FOLDER] [--others FOLDER_OR_FILE ...] [--part PART]
 
 Without a folder: the samples' gestures. Errors in degrees are RMS over the 50 modelled channels,
 errors in millimetres are distances of the ten fingertips, both against the same motion with the
@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from usdhand.reduce.curve import error_curve
 from usdhand.reduce.errors import Errors, pca_rms
 from usdhand.reduce.evidence import Takes, gather
 from usdhand.reduce.fit import Statistics
-from usdhand.reduce.method import apply_rig, fit_rig, fit_to
+from usdhand.reduce.method import apply_rig, fit_to
 from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.search import thresholds_for_count
 from usdhand.reduce.settings import PRESETS, Criteria, Fit, Target
@@ -51,7 +52,7 @@ def files(folder: Path) -> list[Path]:
     return find_files([str(folder)])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Take:
     """A clip with its hands and all their channels."""
 
@@ -66,33 +67,52 @@ class Take:
         hands = find_hands(clip)
         return cls(clip, hands, hands.encode(clip))
 
-    @property
+    @cached_property
     def curves(self) -> Array:
         """(frames, 50) degrees."""
         return self.source.select(self.hands.model_names).values
 
+    @cached_property
+    def evidence(self) -> Takes:
+        """What a fit to this take alone needs."""
+        return gather([(self.clip, self.hands, self.source)])
 
-def fitted(takes: Sequence[Take], target: Target, fit: str) -> ReducedRig:
-    """One rig for all takes."""
+    def missed(self, rig: ReducedRig) -> float:
+        """Mean squared error of a rig in degrees."""
+        given = rig.evaluate(rig.on_turn(self.source.select(rig.free))).select(rig.names).values
+        away = given - self.source.select(rig.names).values
+        return float(np.mean((away - 360.0 * np.rint(away / 360.0)) ** 2))
+
+
+def together(takes: Sequence[Take]) -> Takes:
+    """What a fit to all takes needs."""
+    return gather((t.clip, t.hands, t.source) for t in takes)
+
+
+def fitted(evidence: Takes, target: Target, fit: str) -> ReducedRig:
+    """One rig by the paper's rules."""
     kind, most = FITS[fit]
-    clips, hands, sources = zip(*((t.clip, t.hands, t.source) for t in takes), strict=True)
-    return fit_rig(clips, hands, target, kind, most, sources)
+    return fit_to(evidence, target, kind, most)
 
 
 def best(
-    takes: Sequence[Take], count: int, most: int | None = None, choice: Criteria | None = None
+    evidence: Takes, count: int, most: int | None = None, choice: Criteria | None = None
 ) -> ReducedRig:
-    """One rig of the best channels for all takes."""
-    evidence = gather((t.clip, t.hands, t.source) for t in takes)
+    """One rig of the best channels."""
     return fit_to(evidence, Target(free_channels=count), "least-squares", most, choice)
 
 
-def searched(takes: Sequence[Take], count: int, most: int) -> ReducedRig:
-    """One rig for all takes by the paper's rules, with thresholds searched for the count."""
-    statistics = Statistics.of(np.concatenate([t.curves for t in takes]))
+def searched(evidence: Takes, count: int, most: int) -> ReducedRig:
+    """One rig by the paper's rules, with thresholds searched for the count."""
+    statistics = Statistics.from_moments(evidence.moments)
     target = Target(thresholds_for_count(statistics, count, "least-squares"))
-    clips, hands, sources = zip(*((t.clip, t.hands, t.source) for t in takes), strict=True)
-    return fit_rig(clips, hands, target, "least-squares", most, sources)
+    return fit_to(evidence, target, "least-squares", most)
+
+
+def rms(rig: ReducedRig, takes: Sequence[Take]) -> float:
+    """RMS degrees over takes."""
+    weights = [len(t.clip) for t in takes]
+    return float(np.sqrt(np.average([t.missed(rig) for t in takes], weights=weights)))
 
 
 @dataclass(frozen=True)
@@ -122,7 +142,7 @@ def loss(rig: ReducedRig, takes: Sequence[Take], which: str = "errors") -> Loss:
 
 def single(takes: Sequence[Take], target: Target, fit: str) -> tuple[float, Loss]:
     """A rig for every take alone: mean number of free channels, mean of the takes' errors."""
-    rigs = [fitted([t], target, fit) for t in takes]
+    rigs = [fitted(t.evidence, target, fit) for t in takes]
     losses = [loss(rig, [t]) for rig, t in zip(rigs, takes, strict=True)]
     return float(np.mean([len(r.free) for r in rigs])), Loss(
         float(np.mean([x.rms for x in losses])),
@@ -172,15 +192,16 @@ def print_presets(takes: Sequence[Take]) -> None:
     rows = []
     for preset, thresholds in PRESETS.items():
         found = [single(takes, Target(thresholds), fit) for fit in FITS]
-        free = [len(fitted([t], Target(thresholds), "paper").free) for t in takes]
+        free = [len(fitted(t.evidence, Target(thresholds), "paper").free) for t in takes]
         pca = np.mean([pca_rms(t.curves, n) for t, n in zip(takes, free, strict=True)])
         rows.append(loss_row(preset, found[0][0], [x for _, x in found], float(pca)))
     table(LOSS_HEADS, rows)
 
     print("**One rig for all takes together.**\n")
+    evidence = together(takes)
     rows = []
     for preset, thresholds in PRESETS.items():
-        rigs = [fitted(takes, Target(thresholds), fit) for fit in FITS]
+        rigs = [fitted(evidence, Target(thresholds), fit) for fit in FITS]
         free = len(rigs[0].free)
         rows.append(loss_row(preset, free, [loss(r, takes) for r in rigs], pca_rms(pooled, free)))
     table(LOSS_HEADS, rows)
@@ -192,15 +213,16 @@ def print_presets(takes: Sequence[Take]) -> None:
         f"errors on the other {len(held)} (every third by name).\n"
     )
     known_curves, held_curves = (np.concatenate([t.curves for t in g]) for g in (known, held))
+    evidence = together(known)
     rows = []
     for preset, thresholds in PRESETS.items():
-        rigs = [fitted(known, Target(thresholds), fit) for fit in FITS]
+        rigs = [fitted(evidence, Target(thresholds), fit) for fit in FITS]
         free = len(rigs[0].free)
         pca = pca_on_others(known_curves, held_curves, free)
         rows.append(loss_row(preset, free, [loss(r, held) for r in rigs], pca))
     table(LOSS_HEADS, rows)
 
-    rig = fitted(takes, Target(PRESETS[1]), "paper")
+    rig = fitted(together(takes), Target(PRESETS[1]), "paper")
     model = loss(rig, takes, "model_errors")
     print(
         "**The model's own loss**: the 40 angles outside the 25 channels a hand, held at their "
@@ -217,16 +239,16 @@ def print_alone(takes: Sequence[Take]) -> None:
         pca = float(np.mean([pca_rms(t.curves, count) for t in takes]))
         cells: list[Any] = [count, pca]
         cells += [
-            float(np.mean([loss(best([t], count, n), [t]).rms for t in takes]))
+            float(np.mean([rms(best(t.evidence, count, n), [t]) for t in takes]))
             for n in BEST.values()
         ]
         cells += [
-            float(np.mean([loss(searched([t], count, n), [t]).rms for t in takes]))
+            float(np.mean([rms(searched(t.evidence, count, n), [t]) for t in takes]))
             for n in SEARCHED.values()
         ]
         rows.append(cells)
     table(("free", "PCA", *BEST, *SEARCHED), rows)
-    needed = [_for_one_degree(gather([(t.clip, t.hands, t.source)])) for t in takes]
+    needed = [_for_one_degree(t.evidence) for t in takes]
     own, pca_count = (float(np.mean([n[k] for n in needed])) for k in (0, 1))
     print(
         f"For 1 degree RMS a take needs {own:.1f} free channels (mean), PCA {pca_count:.1f} "
@@ -264,21 +286,22 @@ def print_others(takes: Sequence[Take], others: Sequence[Path]) -> None:
         + ". Degrees RMS.\n"
     )
     groups = {"fitted": known, **groups}
+    evidence = together(known)
     rows: list[list[Any]] = []
     for count in (10, 15, 20, 25):
-        rigs = {label: best(known, count, n) for label, n in BEST.items()}
-        rigs |= {label: searched(known, count, n) for label, n in SEARCHED.items()}
+        rigs = {label: best(evidence, count, n) for label, n in BEST.items()}
+        rigs |= {label: searched(evidence, count, n) for label, n in SEARCHED.items()}
         for name, group in groups.items():
             curves = np.concatenate([t.curves for t in group])
             pca = pca_on_others(known_curves, curves, count)
-            rows.append([count, name, pca, *(loss(r, group).rms for r in rigs.values())])
+            rows.append([count, name, pca, *(rms(r, group) for r in rigs.values())])
     table(("free", "on", "PCA", *BEST, *SEARCHED), rows)
 
     print("**The fingertips**, one rig for the same takes, 15 channels free. Mean mm.\n")
     rigs = {
-        "best by deg": best(known, 15),
-        "best by mm": best(known, 15, None, Criteria("mm")),
-        **{label: searched(known, 15, n) for label, n in SEARCHED.items()},
+        "best by deg": best(evidence, 15),
+        "best by mm": best(evidence, 15, None, Criteria("mm")),
+        **{label: searched(evidence, 15, n) for label, n in SEARCHED.items()},
     }
     table(
         ("on", *rigs),
@@ -293,8 +316,7 @@ def _fits(take: Take, other: Take) -> bool:
 def print_curve(takes: Sequence[Take]) -> None:
     """Table of errors by number of free channels, one rig for all takes."""
     print("**Error against number of channels**, one rig for all takes (`--target-dofs`).\n")
-    evidence = gather((t.clip, t.hands, t.source) for t in takes)
-    curve = error_curve(evidence)
+    curve = error_curve(together(takes))
     rows = []
     for point in curve.points:
         cells: list[Any] = [point.channels]
@@ -311,14 +333,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, default=SAMPLES)
     parser.add_argument("--others", type=Path, nargs="*", default=[])
+    parser.add_argument("--part", choices=("best", "presets"), help="one half of the tables alone")
     given = parser.parse_args()
     folder: Path = given.data
     takes = [Take.read(p) for p in files(folder)]
     frames = sum(len(t.clip) for t in takes)
     print(f"{len(takes)} takes, {frames} frames.\n")
-    print_alone(takes)
-    print_others(takes, given.others)
-    print_curve(takes)
+    if given.part != "presets":
+        print_alone(takes)
+        print_others(takes, given.others)
+        print_curve(takes)
+    if given.part == "best":
+        return
     print_presets(takes)
     print("**Share of variance off the flexion axis**, each take about its own mean.\n")
     table(("joint", "left", "right"), off_axis_shares([t.source for t in takes]))

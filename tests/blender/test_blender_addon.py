@@ -181,11 +181,11 @@ def test_many_controllers_and_edits_beyond_the_limits(
     most = max(len(r.controllers) for r in rig.relations)
     assert most == 3 if controllers else most > 18
     followed = [n for n in rig.free if any(n in r.controllers for r in rig.relations)]
-    edits: list[list[object]] = [["offset", name, 60.0] for name in followed[::3]]
+    edits: list[list[object]] = [["offset", name, 150.0] for name in followed[::3]]
     trip(clip, tmp_path, edits, tmp_path / "rig.usdc")
     stored = usdhand.read_rig(tmp_path / "rig.usdc")
     assert stored.relations == rig.relations
-    moved = {str(name): 60.0 for _, name, _ in edits}
+    moved = {str(name): 150.0 for _, name, _ in edits}
     reached = 0
     for r in rig.relations:
         if r.kind == "linear" and r.limits:

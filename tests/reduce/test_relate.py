@@ -118,3 +118,18 @@ def test_none_one_and_all_free(free: list[int]) -> None:
     told = told_by(moments.covariance, free, shape)
     assert_allclose(told[free], np.eye(5)[free])
     assert not told[:, [i for i in range(5) if i not in free]].any()
+
+
+def test_what_hardly_moved_does_not_throw_others_far_away() -> None:
+    """A channel that moves in the last take only, and before in step with a large one by chance."""
+    random = np.random.default_rng(0)
+    folds = []
+    for still in (0.02, 0.02, 0.02, 1.0):
+        large = 20.0 * random.normal(size=(200, 3))
+        small = 30.0 * still * random.normal(size=(200, 1))
+        if still < 1.0:
+            small = 0.03 * large[:, :1] + 0.1 * small
+        folds.append(Moments.of(np.concatenate([large, small], axis=1)))
+    shape = Shape(None, 0.1)
+    missed = np.sqrt(np.diag(left_out(folds, [3], shape)))
+    assert missed[:3].max() < 30.0  # no more than without a controller, and a little

@@ -12,7 +12,7 @@ from usdhand.reduce.choose import subsets
 from usdhand.reduce.evidence import Takes
 from usdhand.reduce.fit import Statistics, fit_relations
 from usdhand.reduce.moments import Moments, pooled
-from usdhand.reduce.relate import Shape, residual_moments, told_by
+from usdhand.reduce.relate import FEWEST_FOLDS, Shape, residual_moments, told_by
 from usdhand.reduce.rig import ReducedRig, relation_matrix
 from usdhand.reduce.settings import PRESETS, Criteria
 
@@ -84,7 +84,7 @@ def error_curve(
     """
     choice = choice or Criteria()
     folds = evidence.folds
-    shape = Shape(controllers, RIDGE if len(folds) > 1 else Shape().ridge)
+    shape = Shape(controllers, RIDGE if len(folds) >= FEWEST_FOLDS else Shape().ridge)
     fitted = _losses(evidence, evidence.moments, [evidence.moments], shape, choice)
     unseen: dict[int, list[tuple[Loss, Loss]]] = {}
     weights = np.array([fold.frames for fold in folds]) / evidence.moments.frames

@@ -18,9 +18,14 @@ from usdhand.reduce.subset import SAME_SHARE, TINY, Measure
 
 # Shares of each controller's variance that are tried as ridge, and numbers of controllers.
 RIDGES = (1e-9, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+# Of controllers that moved less, as of one with this share of the mean variance of all channels:
+# else slopes on what hardly moved would throw others far away where it moves.
+LEAST_SHARE = 0.5
 NUMBERS = (1, 2, 3, 4, 6, 9, 14)
 # Fewer controllers are taken where they raise the error by no more than this share.
 WORTHWHILE = 0.01
+# Fewer folds tell too little of what holds on others: one left out leaves hardly any to fit.
+FEWEST_FOLDS = 3
 # Squared errors on takes left out that differ by less are alike.
 ALIKE = 1.02**2
 
@@ -53,7 +58,9 @@ def told_by(covariance: Array, free: Sequence[int], shape: Shape) -> Array:
     order, left = controllers_in_order(covariance, np.asarray(free), dependent, most)
     enough = left <= left[:, -1:] * (1.0 + shape.spared) ** 2 + TINY
     counts = enough.argmax(axis=1)
-    ridge = covariance + np.diag((SAME_SHARE + shape.ridge) * np.diag(covariance) + TINY)
+    own = np.diag(covariance)
+    shares = SAME_SHARE * own + shape.ridge * np.maximum(own, LEAST_SHARE * own.mean())
+    ridge = covariance + np.diag(shares + TINY)
     for count in np.unique(counts[counts > 0]):
         rows = np.flatnonzero(counts == count)
         chosen = order[rows, :count]
@@ -98,10 +105,10 @@ def best_shape(
     """Ridge, and number of controllers up to ``most``, with the least error on folds left out.
 
     Of what is about as good, the largest ridge, since takes of one session are more alike than what
-    a rig meets later, and the fewest controllers. One fold alone shows nothing about others:
-    all controllers then, and no ridge.
+    a rig meets later, and the fewest controllers. With too few folds to tell: all controllers, and
+    no ridge.
     """
-    if len(folds) < 2 or not len(free):
+    if len(folds) < FEWEST_FOLDS or not len(free):
         return Shape(most)
 
     def error(shape: Shape) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from usdhand.motion.rotations import Array
 from usdhand.reduce.moments import Moments, pooled
-from usdhand.reduce.relate import ALIKE, RIDGES, Shape, residual_moments, told_by
+from usdhand.reduce.relate import ALIKE, FEWEST_FOLDS, RIDGES, Shape, residual_moments, told_by
 from usdhand.reduce.subset import Measure, Subsets
 
 # Numbers of free channels by which it is judged.
@@ -20,12 +20,12 @@ def related_channels(names: Sequence[str], folds: Sequence[Moments]) -> Array:
 
     What hands have in common seldom holds on other takes, and who moves one hand wants the other to
     stay. So channels follow those of their own hand, unless that is clearly worse on folds left
-    out. In one take alone they may follow all.
+    out. In one take or two they may follow all.
     """
     sides = np.array([name[:2] for name in names])
     same = np.where(sides[:, None] == sides[None, :], 1.0, 0.0)
     both = np.ones_like(same)
-    if len(folds) < 2 or same.all():
+    if len(folds) < FEWEST_FOLDS or same.all():
         return both
     apart, together = _errors(folds, same), _errors(folds, both)
     return same if np.mean(np.log(apart) - np.log(together)) <= np.log(ALIKE) else both
