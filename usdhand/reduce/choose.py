@@ -73,7 +73,9 @@ def subsets(
     wanted = {name for name, moves in zip(names, moving, strict=True) if moves} | kept
     if choice.symmetric:
         if len({name[:2] for name in names}) < 2:
-            raise UsageError("The same channels of both hands need both hands.")
+            raise UsageError(
+                "--symmetric leaves the same channels of both hands free, but there is one hand."
+            )
         digits = {name[2:] for name in wanted}
         wanted = {name for name in names if name[2:] in digits}
     together: dict[str, list[int]] = {}

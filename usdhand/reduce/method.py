@@ -160,7 +160,7 @@ def apply_rig(
     if missing:
         raise UsageError(
             f"The rig has the channel '{missing[0]}' that the hands of {clip.name} do not have "
-            f"({len(missing)} such channels)."
+            f"({len(missing)} such channels): fit one to clips with such hands."
         )
     free = rig.on_turn(source.select(rig.free))
     # Channels of this hand that the rig knows nothing of keep their motion.

@@ -235,16 +235,16 @@ def _rig_text(result: Mapping[str, Any], verbose: bool) -> str:
     if result["measure"]:
         most = max((len(c["controllers"]) for c in channels), default=0)
         of = "degrees of all channels" if result["measure"] == "deg" else "mm at the fingertips"
-        how = f"up to {most} channels each; the best channels by {of}"
+        each = f" up to {most} channels each" if most > 1 else " one channel each" if most else ""
+        how = f"{each}; the best channels by {of}"
     else:
         how = (
-            f"range < {thresholds['range_deg']:g} deg, rmsd < {thresholds['rmsd']:g}, "
+            f"; range < {thresholds['range_deg']:g} deg, rmsd < {thresholds['rmsd']:g}, "
             f"{result['fit']} fit"
         )
     lines = [
         f"{len(free)} of {len(channels)} channels stay free "
-        f"({kinds.count('constant')} constant, {kinds.count('linear')} follow"
-        + (f" {how})" if result["measure"] else f"; {how})"),
+        f"({kinds.count('constant')} constant, {kinds.count('linear')} follow{how})",
         "free: " + (" ".join(free) or "none"),
     ]
     if over := result["followed_to_root_over_threshold"]:
@@ -287,7 +287,7 @@ def curve_text(curve: Mapping[str, Any], verbose: bool) -> str:
     unit = curve["measure"]
     suggested = f"suggested: --target-dofs {curve['suggested_channels']}"
     if not verbose:
-        shown = [p for p in points if p["channels"] in SHOWN_COUNTS and p[kind]]
+        shown = [p for p in points if p["channels"] in SHOWN_COUNTS and p[kind]] or points[-1:]
         numbers = ", ".join(f"{p['channels']}: {p[kind][unit]:.2f}" for p in shown)
         on = "on takes left out" if kind == "left_out" else "on this motion"
         return f"RMS {unit} {on} by number of free channels: {numbers}; {suggested}"
