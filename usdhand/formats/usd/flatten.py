@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pxr import Sdf, Usd
+from pxr import Sdf, Tf, Usd
 
 from usdhand.formats.usd.composed import first_difference, variant_places
-from usdhand.formats.usd.damage import usd_diagnostics
+from usdhand.formats.usd.damage import first_line, sentence, usd_diagnostics
 from usdhand.formats.usd.embed import EMBEDDED, NotEmbeddedError, embedded
 from usdhand.formats.usd.stage import compose, one_thread
 from usdhand.problems import Problem
@@ -34,8 +34,13 @@ def flat_layer(stage: Usd.Stage) -> tuple[Sdf.Layer, tuple[Problem, ...]]:
 
 
 def _embedded(stage: Usd.Stage) -> Sdf.Layer:
-    flat = embedded(stage)
-    if place := first_difference(stage.GetRootLayer(), flat, variants=True):
+    try:
+        flat = embedded(stage)
+        place = first_difference(stage.GetRootLayer(), flat, variants=True)
+    except Tf.ErrorException as error:  # specializes below references may be too much for USD
+        why = first_line(sentence(error.args[0]))
+        raise NotEmbeddedError(f"USD cannot compose some of its variants ({why})") from error
+    if place:
         raise NotEmbeddedError(f"{place} would not stay the same")
     return flat
 
