@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
+from builders import stages
 from builders.random_stages import random_stage
 from hypothesis import HealthCheck, assume, given, reject, settings
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from oracles.composition import assert_composes_alike
 from pxr import Tf, Usd
 
 from usdhand.formats.usd.composed import variant_places
+from usdhand.formats.usd.flatten import flat_layer
 from usdhand.formats.usd.stage import one_thread, usd_diagnostics
 from usdhand.formats.usd.write import save_flat
 
@@ -76,3 +78,21 @@ def test_random_stages_stay_what_they_are(data: st.DataObject) -> None:
 @given(st.data())
 def test_many_random_stages_stay_what_they_are(data: st.DataObject) -> None:
     check_one(data)
+
+
+def test_variants_that_usd_cannot_compose_are_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seldom, specializes arcs below references make USD fail where a variant is selected."""
+
+    def failing(*_: object, **__: object) -> str:
+        return str(Usd.Stage.Open(str(tmp_path / "none.usda")))
+
+    path = stages.character(tmp_path / "in.usda")
+    stage = stages.edited(path)
+    stage.GetPrimAtPath(stages.ROOT).GetVariantSets().AddVariantSet("look").AddVariant("red")
+    stage.Save()
+    monkeypatch.setattr("usdhand.formats.usd.flatten.first_difference", failing)
+    _, [lost] = flat_layer(Usd.Stage.Open(str(path)))
+    assert lost.code == "variants"
+    assert "only the selected variants are kept, since USD cannot compose" in lost.message

@@ -417,17 +417,3 @@ def test_alternatives_of_fill_are_there_in_one_file(flatten: bool, tmp_path: Pat
     run("convert", alone, "-o", plain, "--trim", "1:20")
     layer = Sdf.Layer.FindOrOpen(str(plain))
     assert [p.name for p in layer.rootPrims] == ["Ada"]
-
-
-def test_variants_that_usd_cannot_compose_are_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Seldom, specializes arcs below references make USD fail where a variant is selected."""
-
-    def failing(*_: object, **__: object) -> str:
-        return str(Usd.Stage.Open(str(tmp_path / "none.usda")))
-
-    monkeypatch.setattr("usdhand.formats.usd.flatten.first_difference", failing)
-    _, [lost] = flat_layer(Usd.Stage.Open(str(local(tmp_path))))
-    assert lost.code == "variants"
-    assert "only the selected variants are kept, since USD cannot compose" in lost.message
