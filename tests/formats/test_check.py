@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -314,3 +316,18 @@ def test_samples_are_right(kind: str) -> None:
     assert files
     codes = {finding.code for file in files[::6] for finding in check_file(file)}
     assert codes == ({"no-animation"} if kind == "characters" else set())
+
+
+def test_other_verbs_do_not_need_usd_validation(tmp_path: Path) -> None:
+    path = stages.character(tmp_path / "in.usda")
+    program = (
+        "import sys; sys.modules['pxr.UsdValidation'] = None; "
+        "from usdhand.cli.main import main; main(sys.argv[1:])"
+    )
+    for line in (["convert", path, "-o", tmp_path / "a.usdz"], ["compare", path, path]):
+        done = subprocess.run(
+            [sys.executable, "-c", program, *line], capture_output=True, text=True
+        )
+        assert "UsdValidation" not in done.stderr
+        assert "unexpected" not in done.stderr
+    assert (tmp_path / "a.usdz").exists()
