@@ -15,8 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-if "bpy" in sys.modules or "--blender" in sys.argv:
-    import bpy  # noqa: F401  it brings its own USD
+if "--blender" in sys.argv:  # it brings its own USD
+    import bpy
+
+    packages = Path(bpy.utils.resource_path("LOCAL")).glob("python/lib/python*/site-packages")
+    sys.path.extend(map(str, packages))
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
 MOST_TIMES = 7
