@@ -9,6 +9,7 @@ from pxr import Sdf, Tf
 from usdhand.errors import OutputError, UsdHandError
 from usdhand.formats.atomic import pair_written_beside, written_beside
 from usdhand.formats.paths import motion_crate
+from usdhand.formats.usd.damage import first_line, sentence
 from usdhand.formats.usd.motion_crate import own_crate, refer_to, taken_out
 from usdhand.formats.usd.stage import open_stage
 
@@ -54,7 +55,8 @@ def export(layer: Sdf.Layer, path: Path) -> None:
     try:
         done = layer.Export(str(path))
     except Tf.ErrorException as error:
-        raise OutputError(f"{path.parent}: USD cannot write there ({error.args[0]}).") from error
+        why = first_line(*map(sentence, error.args))
+        raise OutputError(f"{path.parent}: USD cannot write there ({why}).") from error
     if not done:
         raise OutputError(f"{path.parent}: USD cannot write there.")
 
