@@ -127,15 +127,16 @@ def author_animation(
     ):
         attribute = Sdf.AttributeSpec(prim, name, value_type)
         rows = (np.ascontiguousarray(row[listed]) for row in curve.rows(dtype))
-        if name != "rotations" and curve.still:  # Blender wants samples of rotations
-            attribute.default = convert(next(rows))
-            continue
+        still = name != "rotations" and curve.still  # Blender wants samples of rotations
         spec = attribute.path
         for time, row in zip(times.tolist(), rows, strict=True):
             if not np.isfinite(row).all():
                 raise InputError(
                     f"{character.path}: {name} at time code {time:g} are too large for USD."
                 )
+            if still:
+                attribute.default = convert(row)
+                break
             layer.SetTimeSample(spec, time, convert(row))
     return times
 
