@@ -17,6 +17,6 @@ def test_scales_beyond_half_precision_are_refused(moving: bool, tmp_path: Path) 
     clip = sample("gestures/ok_01")
     scales = clip.scales.copy()
     scales[-1 if moving else slice(None), 5, 0] = 1e5
-    with pytest.raises(InputError, match="scales at time code .* are too large for USD"):
+    with pytest.raises(InputError, match=r"scales at time code .* are too large for USD"):
         usdhand.write_new(replace(clip, scales=scales, source=None), tmp_path / "a.usdc")
     assert not list(tmp_path.iterdir())
