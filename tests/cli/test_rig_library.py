@@ -60,6 +60,37 @@ def test_one_file_with_relations_alone(show: Path, tmp_path: Path) -> None:
     assert run("check", show).exit_code == 0
 
 
+@pytest.mark.parametrize("by", ["function", "command"])
+def test_no_clip_is_held_when_the_next_is_read(
+    by: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Memory does not grow with the number of clips: counted, not measured."""
+    import gc
+    import weakref
+
+    from usdhand.verbs import reduce
+
+    motions: list[weakref.ref[np.ndarray]] = []
+    alive: list[int] = []
+    real = reduce.read_clip
+
+    def counted(path: Path, skel: str | None = None) -> usdhand.Clip:
+        gc.collect()
+        alive.append(sum(ref() is not None for ref in motions))
+        clip = real(path, skel)
+        motions.append(weakref.ref(clip.rotations))
+        return clip
+
+    monkeypatch.setattr(reduce, "read_clip", counted)
+    if by == "command":
+        out = tmp_path / "rig.usdc"
+        run("reduce", *TAKES, "--fit-only", "--target-dofs", 9, "-o", out, "-q")
+    else:
+        usdhand.fit_rig(TAKES, usdhand.ReduceSettings(free_channels=9))
+    assert len(alive) == len(TAKES)
+    assert max(alive) <= 1  # the one that the loop lets go of when the next has come
+
+
 def test_the_report_has_the_curve(tmp_path: Path) -> None:
     out = tmp_path / "rig.usdc"
     fit = ("--fit-only", "--target-dofs", 9, "--symmetric", "--prefer", "flexion")
