@@ -43,6 +43,25 @@ def test_a_rig_of_a_rig_is_a_rig_of_its_own(tmp_path: Path) -> None:
         assert f"{channel}:value" not in names
 
 
+def test_a_rig_with_other_thumb_axes_moves_its_own_character_only(
+    rig: Path, tmp_path: Path
+) -> None:
+    old = tmp_path / "old.usda"
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.TransferContent(Sdf.Layer.FindOrOpen(str(rig)))
+    layer.GetPrimAtPath(RIG).attributes["usdhand:version"].default = 1
+    layer.Export(str(old))
+    run("expand", old, "-o", tmp_path / "own.usda", "-q")
+    same = run("compare", rig, tmp_path / "own.usda", "--json").stdout
+    assert json.loads(same)["max_deg"] < 1e-3
+    for wrong in (
+        run("expand", old, "--onto", BEN, "-o", tmp_path / "x.usda", code=3),
+        run("reduce", OK, "--rig", old, "-o", tmp_path / "x.usda", code=3),
+    ):
+        assert "thumbs are measured about other axes" in wrong.output
+    assert not (tmp_path / "x.usda").exists()
+
+
 def test_one_hand_after_the_other_leaves_one_rig(tmp_path: Path) -> None:
     left, both = tmp_path / "left.usda", tmp_path / "both.usda"
     run("reduce", OK, "-o", left, "--side", "left", "-q")

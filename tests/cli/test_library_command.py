@@ -258,10 +258,23 @@ def test_a_library_of_another_version_is_refused(library: Path) -> None:
     run("library", "build", gesture, "-o", again, code=3)
     assert "are lost" in run("library", "build", gesture, "-o", again, "--rebuild").output
     assert len(read_library(again).clips) == 1
-    edit_prim(library, ".usdhand:libraryVersion", 1)
+    edit_prim(library, ".usdhand:libraryVersion", 2)
     edit_prim(library, ".usdhand:segmentation:speed", -1.0)
     with pytest.raises(InputError, match="segmentation"):
         read_library(library)
+
+
+def test_a_library_with_other_thumb_axes_is_built_anew_and_keeps_its_labels(library: Path) -> None:
+    name = next(
+        clip.name for clip in read_library(library).clips if clip.path.endswith("ok_01.usdc")
+    )
+    edit_prim(library, f"/Clips/{name}.usdhand:label", "by hand")
+    edit_prim(library, ".usdhand:libraryVersion", 1)
+    gesture = library.parent / "gestures" / "ok_01.usdc"
+    assert "--rebuild" in run("library", "build", gesture, "-o", library, code=3).output
+    run("library", "build", gesture, "-o", library, "--rebuild")
+    [clip] = read_library(library).clips
+    assert clip.label == "by hand"
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from usdhand.anatomy.fingertips import fingertips
 from usdhand.anatomy.frames import HandFrames, hand_frames
 from usdhand.anatomy.hand import SIDE_PREFIX, SIDES, CharacterMap, Side
 from usdhand.anatomy.local_motion import LocalMotion
+from usdhand.anatomy.thumb import Pronation, thumb_pronation
 from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.motion import Clip
@@ -236,8 +237,12 @@ class Hands:
         ``others`` are more clips of the same skeleton: what geometry cannot decide is then the
         same for all of them.
         """
+        clips = others if any(other is clip for other in others) else (clip, *others)
+        pronation = thumb_pronation(
+            clip.skeleton, character.hands.values(), clips, character.pronation
+        )
         found = {
-            side: hand_frames(clip.skeleton, character.hands[side], clip, *others)
+            side: hand_frames(clip.skeleton, character.hands[side], *clips, pronation=pronation)
             for side in sides
             if side in character.hands
         }
@@ -257,6 +262,11 @@ class Hands:
             *self.character.problems,
             *(Problem("hands", guess, severity="note") for guess in guesses),
         )
+
+    @property
+    def pronation(self) -> Pronation | None:
+        """Of the rig's thumbs; None where there are none."""
+        return next((f.pronation for f in self.frames.values() if f.pronation), None)
 
     @property
     def all_names(self) -> tuple[str, ...]:

@@ -88,6 +88,7 @@ class CharacterMap:
     """The hands of a character and the body joints that go with them.
 
     ``convention`` names the rig convention that matched ("geometry" where names were unknown);
+    ``pronation`` is what its thumbs have at the bind pose, in degrees, where that is known;
     ``notes`` say in words what was guessed, ``contradictions`` those of them where the bind pose
     says otherwise than names do; ``evidence`` says what each hand was found by.
     """
@@ -101,6 +102,7 @@ class CharacterMap:
     notes: tuple[str, ...] = ()
     contradictions: tuple[str, ...] = ()
     evidence: tuple[str, ...] = ()
+    pronation: float | None = None
 
     @property
     def problems(self) -> tuple[Problem, ...]:

@@ -34,6 +34,11 @@ def inspect_result(clip: Clip, hands: Hands | None, animated: bool = True) -> di
     }
     if hands is not None:
         result |= map_data(clip, hands.character)
+        if pronation := hands.pronation:
+            result["thumbs"] = {
+                "pronation_deg": pronation.degrees,
+                "decided_by": pronation.witness,
+            }
         if animated:
             result["channels"] = _channel_ranges(clip, hands)
             result["off_axis_share"] = _off_axis_shares(clip, hands)
@@ -179,6 +184,10 @@ def _hand_lines(result: Mapping[str, Any], verbose: bool) -> list[str]:
         )
     body = ", ".join(f"{k} {_leaf(result[k])}" for k in ("hips", "chest", "neck", "head"))
     lines.append(f"    body: {body}")
+    if thumbs := result.get("thumbs"):
+        lines.append(
+            f"    thumbs: pronation {thumbs['pronation_deg']:g} deg, by {thumbs['decided_by']}"
+        )
     channels = result.get("channels", [])
     shown = [c for c in channels if verbose or c["flexion"]]
     if shown:

@@ -70,7 +70,10 @@ def _character(
         name = match.convention.name
         notes.append(f"names are read as those of {name}, by the position of the thumb")
     body: dict[str, Any] = _body(rig, match.body, [h.wrist for h in hands.values()])
-    return CharacterMap(hands, match.convention.name, **body, notes=tuple(notes))
+    pronation = match.convention.pronation
+    return CharacterMap(
+        hands, match.convention.name, **body, notes=tuple(notes), pronation=pronation
+    )
 
 
 def _refuse_twins(

@@ -44,7 +44,7 @@ MOST_BYTES = 1_000_000  # of a map file
 MOST_DOTS = 100  # in a line of one
 LONGEST = 100  # characters of a value in a message
 
-_SETTINGS = ("about", "like", "side", "digit", "prefix")
+_SETTINGS = ("about", "like", "side", "digit", "prefix", "pronation")
 _SHORTHANDS = ("thumb", "thumb_tip", "thumb_carpal", "finger", "metacarpal", "tip")
 _KEYS = {*_SETTINGS, *_SHORTHANDS, *BODY_JOINTS, *HAND_ROLES}
 
@@ -80,6 +80,8 @@ class Convention:
     body : "hips", "chest", ... -> alternative names
     prefixes : prefixes that belong to the convention, most wanted first
     own : True for a convention from a user's file
+    pronation : how far the thumb is turned about its bone at the bind pose, from one that is flat,
+        degrees; None if rigs with such names differ
     """
 
     name: str
@@ -87,6 +89,7 @@ class Convention:
     body: Mapping[str, Names]
     prefixes: Names = ()
     own: bool = False
+    pronation: float | None = None
 
     @cached_property
     def hand_keys(self) -> Mapping[Side | None, Mapping[str, Names]]:
@@ -227,6 +230,8 @@ def _check(table: Mapping[str, Any], where: str) -> None:
         elif key in ("side", "digit"):
             count = 2 if key == "side" else 4
             good, form = _is_list(value) and len(value) == count, f"a list of {count} strings"
+        elif key == "pronation":
+            good, form = _is_pronation(value), "a number of degrees from -135 to 45"
         elif key in ("thumb", "finger"):
             good = _is_sequence(value) and len(value) == 3 and all(map(_is_name, value))
             form = "a list of three names"
@@ -240,6 +245,11 @@ def _short(value: object) -> str:
     """What a message quotes of a value."""
     text = value if isinstance(value, str) and value.isidentifier() else repr(value)
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+
+
+def _is_pronation(value: object) -> bool:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return number and -135.0 <= float(str(value)) <= 45.0
 
 
 def _is_sequence(value: object) -> TypeGuard[Sequence[object]]:
@@ -288,7 +298,8 @@ def _convention(
             for role, names in spelled.items()
         }
     body = {role: _names(table[role]) for role in BODY_JOINTS if role in table}
-    return Convention(name, hands, body, _names(table.get("prefix", [])), own)
+    prefixes, pronation = _names(table.get("prefix", [])), table.get("pronation")
+    return Convention(name, hands, body, prefixes, own, pronation)
 
 
 def _check_apart(spelled: Mapping[str, Names], where: str) -> None:

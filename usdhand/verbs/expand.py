@@ -18,6 +18,7 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.formats.usd.rig import StoredRig
 from usdhand.formats.usd.rig_frames import with_stored_frames
+from usdhand.formats.usd.rig_version import check_version
 from usdhand.motion import Clip
 from usdhand.motion.resample import resample_like
 from usdhand.problems import Problem, listed
@@ -270,7 +271,9 @@ def _refreshed(
 def _chosen(path: str | Path, skel: str | None, rig_skel: str | None) -> tuple[StoredRig, bool]:
     """The rig, and whether ``skel`` chose it, which may then be of no use for the target."""
     names_one = rig_skel is None and skel is not None and usd_rig.names_a_rig(path, skel)
-    return usd_rig.read_stored_rig(path, skel if names_one else rig_skel, "--rig-skel"), names_one
+    stored = usd_rig.read_stored_rig(path, skel if names_one else rig_skel, "--rig-skel")
+    check_version(stored.version, stored.character.path)
+    return stored, names_one
 
 
 def _onto(

@@ -118,7 +118,7 @@ def _previous(request: LibraryBuildRequest, journal: Journal) -> MotionLibrary |
     if not request.output.exists():
         return None
     try:
-        return read_library(request.output)
+        return read_library(request.output, old=request.rebuild)
     except InputError as error:
         if not is_library(request.output):
             message = f"{request.output} exists and is not a motion library; give another name."

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdSkel
 
-VERSION = 1
+VERSION = 2
 PREFIX = "usdhand:channel"
 LIMITS = ("min", "softMin", "softMax", "max")
 SUFFIXES = (".usda", ".usdc", ".usd")

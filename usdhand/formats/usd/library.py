@@ -37,7 +37,9 @@ from usdhand.formats.usd.write import describe_layer, save_layer
 from usdhand.motion import Clip
 from usdhand.problems import Problem, counted
 
-VERSION = 1
+# 2: the thumb's channels are about the axes of a pronated thumb.
+VERSION = 2
+OLD_VERSIONS = (1,)
 ROOT = "/Library"
 CLIPS = f"{ROOT}/Clips"
 LEFT_OUT = f"{ROOT}/LeftOut"
@@ -102,8 +104,11 @@ def _holds_library(stage: Usd.Stage) -> bool:
 
 
 @refuses_damage
-def read_library(path: str | Path) -> MotionLibrary:
+def read_library(path: str | Path, *, old: bool = False) -> MotionLibrary:
     """Read a library, clips in order of their names.
+
+    With ``old``, one of an older version too: its labels and actors are still right, its motion is
+    not.
 
     What is under ``/Library/Clips`` and cannot be used, since someone edited or damaged it, is
     left out and listed in ``damaged``.
@@ -117,7 +122,7 @@ def read_library(path: str | Path) -> MotionLibrary:
     stage = _open(path)
     root = stage.GetPrimAtPath(ROOT)
     version = root.GetAttribute("usdhand:libraryVersion").Get() if root else None
-    if version != VERSION:
+    if version != VERSION and not (old and version in OLD_VERSIONS):
         if version is None:
             raise InputError(
                 f"{path} is not a motion library; "

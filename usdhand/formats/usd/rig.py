@@ -16,10 +16,11 @@ from usdhand.errors import InputError
 from usdhand.formats.usd.character import as_on_stage
 from usdhand.formats.usd.damage import damage_refused, refuses_damage
 from usdhand.formats.usd.read import clip_from_character
-from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, LIMITS, VERSION, author_rig
+from usdhand.formats.usd.rig_author import CHANNEL_PREFIX, HELD, LIMITS, author_rig
 from usdhand.formats.usd.rig_frames import StoredFrames
 from usdhand.formats.usd.rig_residuals import read_residuals
 from usdhand.formats.usd.rig_source import RigSource, rig_source
+from usdhand.formats.usd.rig_version import check_version, rig_version
 from usdhand.formats.usd.stage import (
     Character,
     bound_animation,
@@ -47,6 +48,7 @@ class StoredRig:
     free : curves of the free channels at the clip's frames, edits by others included
     clip : the rig file's own character and its (baked) motion
     frames : the anatomical frames of the skeleton it was fitted on
+    version : of its encoding
     source : the file that it was made from, where it is known
     """
 
@@ -55,6 +57,7 @@ class StoredRig:
     character: Character
     clip: Clip
     frames: Mapping[Side, StoredFrames]
+    version: int
     source: RigSource | None = None
 
 
@@ -126,7 +129,7 @@ def read_stored_rig(path: str | Path, skel: str | None = None, option: str = "--
     path = Path(path)
     stage, problems = open_stage(path)
     prim = find_rig(stage, path, skel, option)
-    rig = read_rig_at(prim, path)
+    rig = read_rig_at(prim, path, with_frames=True)
     found = _skeleton_path(prim)
     if found is None and not prim.GetRelationship("usdhand:skeleton"):
         raise InputError(
@@ -142,7 +145,8 @@ def read_stored_rig(path: str | Path, skel: str | None = None, option: str = "--
     values = np.stack(curves, axis=1) if curves else np.empty((len(clip), 0))
     frames = _stored_frames(prim, path)
     source = rig_source(prim)
-    return StoredRig(rig, Channels(rig.free, values), character, clip, frames, source)
+    free, version = Channels(rig.free, values), rig_version(prim)
+    return StoredRig(rig, free, character, clip, frames, version, source)
 
 
 def find_rig(
@@ -199,7 +203,7 @@ def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Problem]:
             yield Problem("second-rig", message, where, "error")
         seen[skeleton] = where
         try:
-            rig = read_rig_at(prim, path)
+            rig = read_rig_at(prim, path, with_frames=True)
             _stored_frames(prim, path)
             for name in rig.free:
                 _curve(prim, name, np.zeros(1), path)
@@ -207,13 +211,12 @@ def rig_findings(stage: Usd.Stage, path: Path) -> Iterator[Problem]:
             yield Problem("broken-rig", str(error), where, "error")
 
 
-def read_rig_at(prim: Usd.Prim, path: Path) -> ReducedRig:
-    """Read the relations of the rig at a prim; see `read_rig`."""
-    version = prim.GetAttribute("usdhand:version").Get()
-    if version != VERSION:
-        raise InputError(
-            f"{path}: the rig has version {version}, this usdhand reads version {VERSION}."
-        )
+def read_rig_at(prim: Usd.Prim, path: Path, *, with_frames: bool = False) -> ReducedRig:
+    """Read the relations of the rig at a prim; see `read_rig`.
+
+    ``with_frames``: they are used with the frames that are stored beside them.
+    """
+    check_version(rig_version(prim), path, with_frames=with_frames)
     relations, held = [], {}
     for name in _channel_names(prim):
         kind = _value(prim, name, "kind", path)

@@ -9,12 +9,12 @@ import numpy as np
 from pxr import Sdf, Vt
 
 from usdhand.formats.hashing import file_hash
+from usdhand.formats.usd.rig_version import VERSION
 from usdhand.motion.rotations import Array
 from usdhand.reduce.method import Reduction
 from usdhand.reduce.rig import ReducedRig, Relation
 from usdhand.reduce.variation import EDGES_HZ, Residuals
 
-VERSION = 1
 CHANNEL_PREFIX = "usdhand:channel"
 HELD = "held"
 # Attribute of a channel -> that end of its range.
