@@ -19,11 +19,12 @@ from usdhand.errors import InputError
 from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.formats.usd.library import _prim_names as prim_names
 from usdhand.motion import Clip
+from usdhand.motion.skeleton import same_bind
 from usdhand.reduce.settings import ReduceSettings
 from usdhand.report.preview.events import read_report
-from usdhand.verbs import reduce as reduce_verb
+from usdhand.verbs import clips as clips_verb
+from usdhand.verbs.clips import characters
 from usdhand.verbs.library import _unique_names as unique_names
-from usdhand.verbs.reduce import _characters as characters
 
 HOUR = 3600.0
 
@@ -88,10 +89,7 @@ def clips_of(counts: list[int]) -> Iterator[Clip]:
 def test_clips_of_a_character_are_grouped(monkeypatch: pytest.MonkeyPatch) -> None:
     """With one of each character, not with one another."""
     compared: list[int] = []
-    same_bind = reduce_verb._same_bind
-    monkeypatch.setattr(
-        reduce_verb, "_same_bind", lambda a, b: compared.append(1) or same_bind(a, b)
-    )
+    monkeypatch.setattr(clips_verb, "same_bind", lambda a, b: compared.append(1) or same_bind(a, b))
     clips = list(clips_of([100, 50, 50]))
     groups = characters(clips)
     sizes = [len(group) for group in groups]

@@ -26,12 +26,14 @@ from usdhand.anatomy.fingertips import fingertips
 from usdhand.anatomy.frames import HandFrames, hand_frames
 from usdhand.anatomy.hand import SIDE_PREFIX, SIDES, CharacterMap, Side
 from usdhand.anatomy.local_motion import LocalMotion
+from usdhand.anatomy.neutral import Neutral, neutral_bind
 from usdhand.anatomy.thumb import Pronation, thumb_pronation
 from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.motion import Clip
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
+from usdhand.motion.skeleton import same_bind
 from usdhand.problems import Problem, counted
 
 # The letters that abduction, flexion and twist have in a channel's name.
@@ -231,21 +233,40 @@ class Hands:
         character: CharacterMap,
         sides: Sequence[Side] = SIDES,
         others: Sequence[Clip] = (),
+        neutral: Neutral | None = None,
     ) -> Hands:
         """Build the frames of the hands that are there.
 
-        ``others`` are more clips of the same skeleton: what geometry cannot decide is then the
-        same for all of them.
+        Parameters
+        ----------
+        others : more clips of the same joints, the clip itself among them or not: what the bind
+            pose cannot decide is then the same for all of them that share it
+        neutral : a pose to measure from in place of the bind pose
+
+        Raises
+        ------
+        HandNotFoundError
+            see `hand_frames`; or the neutral pose lacks a joint of a hand.
         """
-        clips = others if any(other is clip for other in others) else (clip, *others)
-        pronation = thumb_pronation(
-            clip.skeleton, character.hands.values(), clips, character.pronation
-        )
-        found = {
-            side: hand_frames(clip.skeleton, character.hands[side], *clips, pronation=pronation)
-            for side in sides
-            if side in character.hands
+        together = others if any(other is clip for other in others) else (clip, *others)
+        own = [c for c in together if same_bind(c.skeleton, clip.skeleton)]
+        strangers = [c.skeleton for c in together if not same_bind(c.skeleton, clip.skeleton)]
+        binds, skeleton = {}, clip.skeleton
+        for side, hand in character.hands.items():
+            binds[side] = neutral_bind(skeleton, hand, own, strangers, neutral)
+            skeleton = binds[side].skeleton
+        hands, named = tuple(character.hands.values()), character.pronation
+        pronation = {
+            is_neutral: thumb_pronation(skeleton, hands, own, named, is_gesture=not is_neutral)
+            for is_neutral in {bind.is_neutral for bind in binds.values()}
         }
+        found = {}
+        for side in (side for side in sides if side in character.hands):
+            turned = pronation[binds[side].is_neutral]
+            frames = hand_frames(skeleton, character.hands[side], *own, pronation=turned)
+            if note := binds[side].note:
+                frames = replace(frames, notes=(f"{side} hand: {note}", *frames.notes))
+            found[side] = frames
         return cls(character, found)
 
     @property

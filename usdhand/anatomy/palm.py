@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from usdhand.anatomy.hand import FINGERS, HandMap
+from usdhand.anatomy.hand import FINGERS, HandMap, digit_joints
 from usdhand.errors import HandNotFoundError
 from usdhand.motion import Skeleton
 from usdhand.motion import rotations as rot
@@ -108,6 +108,21 @@ def digit_points(
         if TIP_LENGTH_RANGE[0] < ratio < TIP_LENGTH_RANGE[1]:
             tip = authored
     return [*points, tip], tip
+
+
+def digit_chain(hand: HandMap, digit: str) -> list[str]:
+    """Names of a digit's joints that the rig has, from the palm outwards."""
+    return [digit + j for j in digit_joints(digit) if digit + j in hand.joints]
+
+
+def digit_bones(skeleton: Skeleton, hand: HandMap, digit: str) -> list[Array]:
+    """Bones (3,) of a digit at the bind pose, one a joint, the last one to its tip."""
+    chain = digit_chain(hand, digit)
+    if not chain:
+        return []
+    points, _ = digit_points(skeleton, hand, digit, chain)
+    steps = zip(chain, points[:-1], points[1:], strict=True)
+    return [bone_direction(skeleton, hand.joints[n], end - start) for n, start, end in steps]
 
 
 def bone_direction(skeleton: Skeleton, joint: int, bone: Array) -> Array:

@@ -15,9 +15,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from usdhand.anatomy.hand import FINGERS, HandMap, Side, digit_joints
+from usdhand.anatomy.hand import FINGERS, HandMap, Side
 from usdhand.anatomy.local_motion import LocalMotion
-from usdhand.anatomy.palm import Palm, bent_frame, bone_direction, digit_points, swung_frame
+from usdhand.anatomy.palm import Palm, bent_frame, digit_bones, digit_chain, swung_frame
 from usdhand.motion import Clip, Skeleton
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
@@ -29,6 +29,9 @@ NEUTRAL_THUMB = (0.70, 0.60, 0.40)
 NEUTRAL_PRONATION_DEG = -75.0
 # Pronation of rigs, seen from a thumb that is flat.
 FLAT_DEG, PRONATED_DEG = 0.0, -80.0
+
+# Twist that the CMC is given at a bind pose that is a gesture, where nothing better is known.
+GESTURE_TWIST_DEG = 5.0
 
 # What a rig's own axes tell: an axis across the thumb, turned the way that thumbs are pronated.
 # One within a few degrees of flat says nothing: that is how programs orient joints by themselves.
@@ -76,6 +79,7 @@ def thumb_pronation(
     hands: Iterable[HandMap],
     clips: Sequence[Clip] = (),
     named: float | None = None,
+    is_gesture: bool = False,
 ) -> Pronation:
     """Decide how far the thumbs of a rig are pronated.
 
@@ -88,6 +92,7 @@ def thumb_pronation(
     ----------
     clips : all there are of this skeleton
     named : pronation that the convention of the joint names has; None if that is not known
+    is_gesture : whether hands are bound in a gesture, of which only its own axes and hinges tell
     """
     thumbs = [t for hand in hands if (t := _Thumb.of(skeleton, hand)) is not None]
     by_axes = _by_own_axes(thumbs)
@@ -96,6 +101,9 @@ def thumb_pronation(
         return _said(by_axes, "the rig's own axes", named)
     if (by_hinges := _by_hinges(moves)) is not None:
         return _said(by_hinges, "motion about one hinge", named)
+    if is_gesture:
+        guess = NEUTRAL_PRONATION_DEG + GESTURE_TWIST_DEG
+        return Pronation(guess, "a guess, since the bind pose is a gesture")
     if named is not None:
         return Pronation(float(named), "the convention of the joint names")
     if (by_motion := _by_ip_motion(moves)) is not None:
@@ -122,12 +130,12 @@ class _Thumb:
 
     @classmethod
     def of(cls, skeleton: Skeleton, hand: HandMap) -> _Thumb | None:
-        chain = _chain(hand, "Thumb")
+        chain = digit_chain(hand, "Thumb")
         if not chain:
             return None
         above = neutral_thumb(Palm.of(skeleton, hand))
         frames: dict[str, Array] = {}
-        for name, bone in zip(chain, _bones(skeleton, hand, "Thumb"), strict=True):
+        for name, bone in zip(chain, digit_bones(skeleton, hand, "Thumb"), strict=True):
             above = bent_frame(above, bone) if frames else swung_frame(above, bone)
             frames[name] = above
         return cls(skeleton, hand, frames)
@@ -141,8 +149,8 @@ class _Thumb:
         turns, palm = self.skeleton.bind_rotations, Palm.of(self.skeleton, self.hand)
         axes = []
         for digit in FINGERS:
-            chain = _chain(self.hand, digit)
-            bones = _bones(self.skeleton, self.hand, digit)
+            chain = digit_chain(self.hand, digit)
+            bones = digit_bones(self.skeleton, self.hand, digit)
             above = palm.frame(bones[0]) if bones else np.eye(3)
             for name, bone in zip(chain, bones, strict=True):
                 above = bent_frame(above, bone)
@@ -247,23 +255,10 @@ def _nearest(axis: Array) -> float | None:
 def _is_straight(skeleton: Skeleton, hand: HandMap) -> bool:
     """Whether each digit is a straight line at the bind pose."""
     for digit in hand.digits:
-        bones = [unit(bone) for bone in _bones(skeleton, hand, digit)]
+        bones = [unit(bone) for bone in digit_bones(skeleton, hand, digit)]
         if any(a @ b < np.cos(np.radians(STRAIGHT_DEG)) for a, b in pairwise(bones)):
             return False
     return True
-
-
-def _bones(skeleton: Skeleton, hand: HandMap, digit: str) -> list[Array]:
-    chain = _chain(hand, digit)
-    if not chain:
-        return []
-    points, _ = digit_points(skeleton, hand, digit, chain)
-    steps = zip(chain, points[:-1], points[1:], strict=True)
-    return [bone_direction(skeleton, hand.joints[n], end - start) for n, start, end in steps]
-
-
-def _chain(hand: HandMap, digit: str) -> list[str]:
-    return [digit + j for j in digit_joints(digit) if digit + j in hand.joints]
 
 
 def _sign(side: Side) -> float:

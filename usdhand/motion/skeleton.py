@@ -155,3 +155,8 @@ class Skeleton:
             return self.joints.index(name)
         matches = [i for i, leaf in enumerate(self.names) if leaf == name]
         return matches[0] if len(matches) == 1 else None
+
+
+def same_bind(a: Skeleton, b: Skeleton) -> bool:
+    """Whether two skeletons are bound in one pose."""
+    return a is b or (a.joints == b.joints and np.allclose(a.bind, b.bind, atol=1e-4))

@@ -21,6 +21,7 @@ from usdhand.anatomy.hand import (
     Side,
     digit_joints,
 )
+from usdhand.anatomy.neutral import Neutral
 from usdhand.display import displayed
 from usdhand.errors import UsageError
 from usdhand.inputs import read_text
@@ -127,10 +128,12 @@ class Conventions:
     """All conventions in order of preference, and joints that a user named one by one.
 
     ``explicit`` holds the tables ``[left]``, ``[right]``, ``[body]`` of map files: role -> joint.
+    ``neutral`` is a pose that hands are measured from in place of their bind pose.
     """
 
     conventions: tuple[Convention, ...]
     explicit: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    neutral: Neutral | None = None
 
 
 def load_conventions(*extra: str | Path | Mapping[str, Mapping[str, Any]]) -> Conventions:

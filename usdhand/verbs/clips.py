@@ -15,6 +15,7 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.convert import write_made
 from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
+from usdhand.motion.skeleton import same_bind
 from usdhand.problems import Problem
 from usdhand.rigs import Conventions, map_character
 from usdhand.verbs.files import check_several
@@ -28,8 +29,8 @@ def find_hands(
 ) -> Hands:
     """Find the hands of a clip's skeleton and build their anatomical frames.
 
-    ``others`` are more clips of the same skeleton: what geometry cannot decide is decided by the
-    motion of all of them.
+    ``others`` are more clips: what geometry cannot decide is decided by all of them that have the
+    joints of this one.
 
     Raises
     ------
@@ -50,9 +51,42 @@ def find_hands(
         if not wanted:
             there = " and ".join(character.hands)
             raise HandNotFoundError(f"no {' or '.join(sides)} hand, only the {there} one")
-        return Hands.of(clip, character, wanted, others)
+        alike = [other for other in others if other.skeleton.joints == clip.skeleton.joints]
+        neutral = conventions.neutral if conventions else None
+        return Hands.of(clip, character, wanted, alike, neutral)
     except HandNotFoundError as error:
         raise HandNotFoundError(f"{name}: {error}") from error
+
+
+def find_all_hands(
+    clips: Sequence[Clip],
+    conventions: Conventions | None = None,
+    sides: Sequence[Side] = SIDES,
+) -> list[Hands]:
+    """Hands of clips in their order; those of one character are the same. See `find_hands`."""
+    found: dict[int, Hands] = {}
+    groups = characters(clips)
+    for own in groups:
+        if id(own) not in found:
+            found[id(own)] = find_hands(own[0], conventions, sides, clips)
+    return [found[id(own)] for own in groups]
+
+
+def characters(clips: Sequence[Clip]) -> list[list[Clip]]:
+    """For each clip, those of the same character, which share its anatomical frames.
+
+    That is those with the same joints whose bind pose is that of the first of them.
+    """
+    with_joints: dict[tuple[str, ...], list[list[Clip]]] = {}
+    found: list[list[Clip]] = []
+    for clip in clips:
+        groups = with_joints.setdefault(clip.skeleton.joints, [])
+        own = next((g for g in groups if same_bind(clip.skeleton, g[0].skeleton)), None)
+        if own is None:
+            groups.append(own := [])
+        own.append(clip)
+        found.append(own)
+    return found
 
 
 def misleading_names(clip: Clip, conventions: Conventions | None = None) -> tuple[Problem, ...]:

@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from usdhand.anatomy import SIDES, Hands, Side
 from usdhand.anatomy.channels import Channels
 from usdhand.errors import OutputError, UsageError
@@ -20,6 +18,7 @@ from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd import rig as usd_rig
 from usdhand.formats.usd.rig_library import write_fitted_rig
 from usdhand.motion import Clip, Skeleton
+from usdhand.motion.skeleton import same_bind
 from usdhand.problems import Problem
 from usdhand.reduce.evidence import Takes, gather
 from usdhand.reduce.method import Reduction, apply_rig, fit_to
@@ -32,7 +31,7 @@ from usdhand.report.reduce import curve_data, fit_result, fit_summary, reduce_re
 from usdhand.requests.reduce import ReduceRequest
 from usdhand.requests.shared import sides
 from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands
+from usdhand.verbs.clips import find_all_hands, find_hands
 from usdhand.verbs.files import check_several, find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -71,8 +70,7 @@ def reduce_hands(
     settings = settings or ReduceSettings()
     if not clips:
         raise UsageError("There is no clip to reduce.")
-    characters = _characters(clips)
-    hands = [find_hands(clip, conventions, sides, characters[i]) for i, clip in enumerate(clips)]
+    hands = find_all_hands(clips, conventions, sides)
     sources = [h.encode(clip) for clip, h in zip(clips, hands, strict=True)]
     evidence = None
     if rig is None:
@@ -138,27 +136,6 @@ def write_rig(
     )
 
 
-def _characters(clips: Sequence[Clip]) -> list[list[Clip]]:
-    """For each clip, those of the same character, which may share its anatomical frames.
-
-    That is those with the same joints whose bind pose is that of the first of them.
-    """
-    with_joints: dict[tuple[str, ...], list[list[Clip]]] = {}
-    found: list[list[Clip]] = []
-    for clip in clips:
-        characters = with_joints.setdefault(clip.skeleton.joints, [])
-        own = next((c for c in characters if _same_bind(clip, c[0])), None)
-        if own is None:
-            characters.append(own := [])
-        own.append(clip)
-        found.append(own)
-    return found
-
-
-def _same_bind(a: Clip, b: Clip) -> bool:
-    return a.skeleton is b.skeleton or np.allclose(a.skeleton.bind, b.skeleton.bind, atol=1e-4)
-
-
 def fit_rig(
     clips: Sequence[Clip | str | Path],
     settings: ReduceSettings | None = None,
@@ -196,11 +173,10 @@ def _encoded(
     known: dict[tuple[str, ...], list[tuple[Skeleton, Hands]]] = {}
     for clip in clips:
         own = known.setdefault(clip.skeleton.joints, [])
-        skeleton = clip.skeleton
-        hands = next((h for s, h in own if np.allclose(s.bind, skeleton.bind, atol=1e-4)), None)
+        hands = next((h for s, h in own if same_bind(s, clip.skeleton)), None)
         if hands is None:
             hands = find_hands(clip, conventions, sides)
-            own.append((skeleton, hands))
+            own.append((clip.skeleton, hands))
         yield clip, hands, hands.encode(clip)
 
 
