@@ -106,20 +106,21 @@ def neutral_bind(
     HandNotFoundError
         if the pose that was given lacks a joint of the hand.
     """
-    if given is not None:
+    if given is not None and _is_of(skeleton, hand, given):
         found = _rebound(skeleton, hand, given, needed=True)
         return NeutralBind(found, note=f"neutral from {given.source}")
+    said = "" if given is None else f"{given.source} is of another rig, so its pose is not used"
     if not is_posed(skeleton, hand):
-        return NeutralBind(skeleton)
+        return NeutralBind(skeleton, note=said)
+    said = f"{said}; " if said else ""
     for neutral in _remedies(skeleton, hand, clips, others):
         found = _rebound(skeleton, hand, neutral)
         if not is_posed(found, hand):
-            return NeutralBind(
-                found, note=f"the bind pose is a gesture; neutral from {neutral.source}"
-            )
+            note = f"{said}the bind pose is a gesture; neutral from {neutral.source}"
+            return NeutralBind(found, note=note)
     note = (
-        "the bind pose is a gesture, and no pose of this hand is neutral, so how its thumb is "
-        "turned is a guess; name a neutral clip or pose with --neutral"
+        f"{said}the bind pose is a gesture, and no pose of this hand is neutral; name a neutral "
+        "clip or pose with --neutral"
     )
     return NeutralBind(skeleton, is_neutral=False, note=note)
 
@@ -197,6 +198,11 @@ def _rebound(skeleton: Skeleton, hand: HandMap, neutral: Neutral, needed: bool =
         parent = int(skeleton.parents[joint])
         world[joint] = world[parent] @ local[joint] if parent >= 0 else local[joint]
     return replace(skeleton, bind=world)
+
+
+def _is_of(skeleton: Skeleton, hand: HandMap, neutral: Neutral) -> bool:
+    """Whether a pose has any joint of a hand."""
+    return any(skeleton.names[j] in neutral.rotations for j in hand.joints.values())
 
 
 def _hand_joints(skeleton: Skeleton, hand: HandMap) -> list[int]:

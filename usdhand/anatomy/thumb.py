@@ -156,6 +156,8 @@ class _Thumb:
                 above = bent_frame(above, bone)
                 axes.append(turns[self.hand.joints[name]].T @ above[:, 1])
         local = np.array(axes)
+        if not np.isfinite(local).all():
+            return None
         axis = np.linalg.eigh(local.T @ local)[1][:, -1]
         if np.abs(local @ axis).min() < np.cos(np.radians(FINGER_AXES_APART)):
             return None
@@ -182,10 +184,10 @@ class _Moves:
         bind, sign = thumb.skeleton.bind_rotations, _sign(thumb.hand.side)
         for above, name in pairwise(thumb.frames):
             joint, reference = (thumb.hand.joints[n] for n in (name, above))
-            turns = [LocalMotion(clip).turn(joint, reference).T for clip in clips]
+            turns = [_numbers(LocalMotion(clip).turn(joint, reference).T) for clip in clips]
             total, count = np.zeros((3, 3)), sum(map(len, turns))
             to_frame = (bind[joint].T @ thumb.frames[name]) * [sign, 1.0, sign]
-            for q in turns:
+            for q in filter(len, turns):
                 away = rot.multiply(rot.conjugate(rot.mean(q)), q)
                 vectors = np.degrees(rot.to_rotation_vector(away)) @ to_frame
                 total += vectors.T @ vectors
@@ -259,6 +261,11 @@ def _is_straight(skeleton: Skeleton, hand: HandMap) -> bool:
         if any(a @ b < np.cos(np.radians(STRAIGHT_DEG)) for a, b in pairwise(bones)):
             return False
     return True
+
+
+def _numbers(rows: Array) -> Array:
+    """Rows (n, 4) without those that are no numbers, which writing refuses later."""
+    return rows[np.isfinite(rows).all(axis=1)]
 
 
 def _sign(side: Side) -> float:

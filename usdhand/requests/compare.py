@@ -36,5 +36,6 @@ class CompareRequest(Request):
     skel: str | None = shared.skel()
     skel_b: str | None = shared.skel("Skeleton of B, if it is a different one.")
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     report: Path | None = shared.report()
     force: bool = shared.force("a report")

@@ -111,6 +111,7 @@ class ConvertRequest(Request):
     reading: Reading = settings(Reading())
     onto_skel: str | None = shared.skel("Skeleton of the character to put fingers on.")
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     flatten: bool = option(
         "Write a .usda as one file, without a crate beside it for its motion.", default=False
     )

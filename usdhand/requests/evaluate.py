@@ -43,6 +43,7 @@ class EvaluateRequest(Request):
     metric: str | None = option("Metric of fill instead of the preset's.", default=None)
     labels_only: bool = option("Measure label agreement only, no reconstruction.", default=False)
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     report: Path | None = shared.report()
     plots: Path | None = shared.plots()
     force: bool = shared.force()

@@ -60,6 +60,7 @@ class ExpandRequest(Request):
     flatten: bool = shared.flatten()
     allow_outside: bool = shared.allow_outside()
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     report: Path | None = shared.report()
     dry_run: bool = shared.dry_run()
     force: bool = shared.force()

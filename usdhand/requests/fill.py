@@ -59,6 +59,7 @@ class FillRequest(Request):
     allow_outside: bool = shared.allow_outside()
     skel: str | None = shared.skel()
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     report: Path | None = shared.report()
     plots: Path | None = shared.plots()
     dry_run: bool = shared.dry_run()

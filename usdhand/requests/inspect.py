@@ -30,5 +30,6 @@ class InspectRequest(Request):
     files: tuple[str, ...] = argument("Files, folders and wildcards.", several="files")
     skel: str | None = shared.skel()
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     plots: Path | None = shared.plots()
     force: bool = shared.force("a plot")

@@ -44,6 +44,7 @@ class LibraryBuildRequest(Request):
     jobs: int = option("Processes.", default=1, at_least=1)
     rebuild: bool = option("Read all clips again; labels are kept.", default=False)
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     report: Path | None = shared.report()
     force: bool = shared.force()
 

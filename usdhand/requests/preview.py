@@ -76,4 +76,5 @@ class PreviewRequest(Request):
     settings: PreviewSettings = settings(PreviewSettings())
     skel: str | None = shared.skel()
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     force: bool = shared.force()

@@ -57,6 +57,15 @@ def maps() -> Any:
     )
 
 
+def neutral() -> Any:
+    """``--neutral``: what hands are measured from."""
+    return option(
+        "Clip or character of the same rig whose hands are neutral, where the bind pose is not.",
+        default=None,
+        metavar="FILE",
+    )
+
+
 def report() -> Any:
     """``--report``: the JSON document in a file."""
     return option(

@@ -70,6 +70,7 @@ class SpliceRequest(Request):
     skel: str | None = shared.skel()
     hands_skel: str | None = shared.skel("Skeleton of the hand clip where there are several.")
     maps: tuple[Path, ...] = shared.maps()
+    neutral: Path | None = shared.neutral()
     report: Path | None = shared.report()
     plots: Path | None = shared.plots()
     dry_run: bool = shared.dry_run()

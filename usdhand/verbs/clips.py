@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from usdhand.anatomy import SIDES, Hands, Side
+from usdhand.anatomy.neutral import Neutral, neutral_bind
 from usdhand.errors import HandNotFoundError, UsageError
+from usdhand.formats.files import read_any
 from usdhand.formats.output import check_outputs
 from usdhand.formats.paths import written_files
 from usdhand.formats.sources import character_under
@@ -17,8 +20,66 @@ from usdhand.formats.usd.write import write_motion
 from usdhand.motion import Clip
 from usdhand.motion.skeleton import same_bind
 from usdhand.problems import Problem
-from usdhand.rigs import Conventions, map_character
+from usdhand.rigs import Conventions, load_conventions, map_character
 from usdhand.verbs.files import check_several
+
+
+class RigRequest(Protocol):
+    """What a request says of rigs."""
+
+    @property
+    def maps(self) -> tuple[Path, ...]:
+        """Map files."""
+
+    @property
+    def neutral(self) -> Path | None:
+        """A clip or character whose hands are neutral."""
+
+
+def conventions_of(request: RigRequest) -> Conventions:
+    """The conventions that a request asks for, with the neutral pose that it names.
+
+    Raises
+    ------
+    UsageError, InputError, HandNotFoundError
+        if a file cannot be read, or has no hand that is neutral.
+    """
+    conventions = load_conventions(*request.maps)
+    if request.neutral is None:
+        return conventions
+    return replace(conventions, neutral=neutral_pose(request.neutral, conventions))
+
+
+def rig_files(request: RigRequest) -> tuple[Path, ...]:
+    """Files that a request names to tell about rigs."""
+    return (*request.maps, *([] if request.neutral is None else [request.neutral]))
+
+
+def neutral_pose(path: str | Path, conventions: Conventions | None = None) -> Neutral:
+    """The neutral pose of a clip or character: its bind pose, or a flat frame of its motion.
+
+    Raises
+    ------
+    InputError
+        if the file cannot be read.
+    HandNotFoundError
+        if there is no hand in it, or none of its poses is neutral.
+    """
+    clip, animated = read_any(Path(path))
+    try:
+        hands = map_character(clip.skeleton, conventions).hands
+    except HandNotFoundError as error:
+        raise HandNotFoundError(f"{path}: {error}") from error
+    skeleton = clip.skeleton
+    for side, hand in hands.items():
+        bind = neutral_bind(skeleton, hand, [clip] if animated else [])
+        if not bind.is_neutral:
+            raise HandNotFoundError(
+                f"{path}: the {side} hand is bound in a gesture and no frame of it is flat. Name "
+                "a clip that starts with flat hands, or a character in its T-pose, with --neutral."
+            )
+        skeleton = bind.skeleton
+    return Neutral.of_bind(skeleton, Path(path).name)
 
 
 def find_hands(

@@ -10,8 +10,8 @@ from usdhand.formats.files import read_clip
 from usdhand.motion import Clip
 from usdhand.report.compare import compare_result, summary
 from usdhand.requests.compare import CompareRequest
-from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands, misleading_names
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_of, find_hands, misleading_names, rig_files
 from usdhand.verbs.outcome import Journal, Outcome
 
 
@@ -48,7 +48,7 @@ def run(request: CompareRequest, journal: Journal) -> Outcome:
     """Compare two files; exit 5 if they differ by more than ``max_rms``."""
     if request.max_rms is not None and not request.max_rms >= 0:
         raise UsageError(f"--max-rms {request.max_rms:g}: give a number of degrees, 0 or more.")
-    conventions = load_conventions(*request.maps)
+    conventions = conventions_of(request)
     a, b = read_clip(request.a, request.skel), read_clip(request.b, request.skel_b or request.skel)
     for clip in (a, b):
         journal.about(clip.origin.path, clip.problems)
@@ -63,5 +63,5 @@ def run(request: CompareRequest, journal: Journal) -> Outcome:
         error = QualityError(message)
         journal.fail(error, request.b)
         code = error.exit_code
-    inputs = (request.a, request.b, *request.maps)
+    inputs = (request.a, request.b, *rig_files(request))
     return Outcome(request, inputs, lambda: compare_result(found), summary, exit_code=code)

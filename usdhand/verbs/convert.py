@@ -39,9 +39,9 @@ from usdhand.motion.resample import resample_like
 from usdhand.problems import Problem
 from usdhand.report.convert import convert_result, summary
 from usdhand.requests.convert import ConvertRequest, Edits
-from usdhand.rigs import Conventions, load_conventions, map_character
+from usdhand.rigs import Conventions, map_character
 from usdhand.units import UpAxis
-from usdhand.verbs.clips import find_hands, misleading_names
+from usdhand.verbs.clips import conventions_of, find_hands, misleading_names, rig_files
 from usdhand.verbs.convert_jobs import Job, jobs_of
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
@@ -302,7 +302,7 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
     """Convert every file, or every animation of one; of several, bad ones are left out."""
     if request.onto_skel is not None and request.onto is None:
         raise UsageError("--onto-skel chooses a skeleton of --onto CHARACTER, which is not given.")
-    conventions = load_conventions(*request.maps)
+    conventions = conventions_of(request)
     paths = find_files(request.files)
     jobs, code = jobs_of(paths, request, journal)
     results: list[dict[str, Any]] = []
@@ -324,7 +324,7 @@ def run(request: ConvertRequest, journal: Journal) -> Outcome:
         if not request.dry_run:
             result["output"] = str(job.target)
             written.append(job.target)
-    inputs = (*paths, *filter(None, [request.onto]), *request.maps)
+    inputs = (*paths, *filter(None, [request.onto]), *rig_files(request))
     return Outcome(
         request,
         inputs,

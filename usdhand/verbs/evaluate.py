@@ -26,8 +26,8 @@ from usdhand.report.plots import evaluating as plotting
 from usdhand.report.plots.style import check_plots
 from usdhand.requests.evaluate import EvaluateRequest
 from usdhand.requests.fill import PRESETS
-from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_of, find_hands, rig_files
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -124,7 +124,7 @@ def run(request: EvaluateRequest, journal: Journal) -> Outcome:
             request.library.absolute().parent,
             settings,
             takes=takes,
-            conventions=load_conventions(*request.maps),
+            conventions=conventions_of(request),
             progress=journal.progress("evaluating"),
         )
         left_out = [*unread, *left]
@@ -139,7 +139,7 @@ def run(request: EvaluateRequest, journal: Journal) -> Outcome:
 
     return Outcome(
         request,
-        (request.library, *paths, *request.maps),
+        (request.library, *paths, *rig_files(request)),
         report,
         summary,
         settings={"metric": settings.metric, "fill": asdict(settings)},

@@ -28,8 +28,8 @@ from usdhand.reduce.rig import ReducedRig
 from usdhand.reduce.variation import Variation
 from usdhand.report.expand import expand_result, summary
 from usdhand.requests.expand import ExpandRequest
-from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands, misleading_names, write_clip
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_of, find_hands, misleading_names, rig_files, write_clip
 from usdhand.verbs.outcome import Journal, Outcome
 
 # A channel that changes by less over a clip is still.
@@ -130,7 +130,7 @@ def expand_motion(
 def run(request: ExpandRequest, journal: Journal) -> Outcome:
     """Bake a rig's motion over its own input, over a clip, or over another character."""
     variation = Variation(request.variation, request.seed)
-    conventions = load_conventions(*request.maps)
+    conventions = conventions_of(request)
     inputs = [p for p in (request.rig, request.motion, request.onto) if p is not None]
     outputs = written_files(request.output, flatten=request.flatten)
     check_outputs(outputs, inputs, request.force, USD_SUFFIXES)
@@ -154,7 +154,7 @@ def run(request: ExpandRequest, journal: Journal) -> Outcome:
         return {"output": output} | expand_result(motion, rig, request.motion is not None)
 
     written = () if request.dry_run else (request.output,)
-    return Outcome(request, (*inputs, *request.maps), report, summary, written=written)
+    return Outcome(request, (*inputs, *rig_files(request)), report, summary, written=written)
 
 
 def _baked(

@@ -30,8 +30,8 @@ from usdhand.report.plots import filling as plotting
 from usdhand.report.plots.style import check_plots
 from usdhand.requests.fill import FillRequest
 from usdhand.requests.shared import sides
-from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands, misleading_names
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_of, find_hands, misleading_names, rig_files
 from usdhand.verbs.finger_joints import add_fingers, lacks_fingers
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -145,7 +145,7 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
     check_outputs(outputs, given, request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
-    conventions = load_conventions(*request.maps)
+    conventions = conventions_of(request)
     library = read_library(request.library)
     for entry in library.damaged:
         message = f"{entry.file} of the library cannot be used: {entry.message}"
@@ -193,7 +193,7 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
     cutting = request.settings.segmentation or library.segmentation
     return Outcome(
         request,
-        (*given, *request.maps),
+        (*given, *rig_files(request)),
         report,
         summary,
         settings={"segmentation": asdict(cutting), "add_fingers": bool(added)},

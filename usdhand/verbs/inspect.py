@@ -17,8 +17,8 @@ from usdhand.report.inspect import inspect_result, rig_result, summary
 from usdhand.report.plots import rigs
 from usdhand.report.plots.style import check_plots
 from usdhand.requests.inspect import InspectRequest
-from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_of, find_hands, rig_files
 from usdhand.verbs.files import find_files
 from usdhand.verbs.outcome import Journal, Outcome
 from usdhand.workers import each_apart
@@ -27,7 +27,7 @@ from usdhand.workers import each_apart
 def run(request: InspectRequest, journal: Journal) -> Outcome:
     """Look into every file; exit 4 if one has no hands, or as the worst of its errors says."""
     paths = find_files(request.files)
-    conventions = load_conventions(*request.maps)
+    conventions = conventions_of(request)
     if request.plots is not None:
         check_plots(request.plots, rigs.NAMES, request.force)
     results: list[dict[str, Any]] = []
@@ -53,7 +53,7 @@ def run(request: InspectRequest, journal: Journal) -> Outcome:
         )
     return Outcome(
         request,
-        (*paths, *request.maps),
+        (*paths, *rig_files(request)),
         lambda: {"files": results},
         summary,
         figures=lambda: rigs.figures(found_rigs[0]),

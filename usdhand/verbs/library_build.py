@@ -28,7 +28,7 @@ from usdhand.inputs import read_text
 from usdhand.problems import counted, listed
 from usdhand.report.library import library_result, summary
 from usdhand.requests.library import LibraryBuildRequest
-from usdhand.rigs import load_conventions
+from usdhand.verbs.clips import conventions_of, rig_files
 from usdhand.verbs.files import find_files_below
 from usdhand.verbs.library import (
     BuildResult,
@@ -50,7 +50,7 @@ def run(request: LibraryBuildRequest, journal: Journal) -> Outcome:
     check_outputs(written_files(output), paths, True, OUTPUTS)
     previous = _previous(request, journal)
     labels = _read_labels(request.labels) if request.labels else None
-    conventions = load_conventions(*request.maps) if request.maps else None
+    conventions = conventions_of(request)
     try:
         with _terminated_as_interrupted():
             built = build_library(
@@ -84,7 +84,7 @@ def run(request: LibraryBuildRequest, journal: Journal) -> Outcome:
 
     return Outcome(
         request,
-        (*paths, *request.maps),
+        (*paths, *rig_files(request)),
         report,
         summary,
         settings={"segmentation": asdict(built.library.segmentation)},

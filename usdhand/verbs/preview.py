@@ -31,8 +31,8 @@ from usdhand.report.preview.pack import Pack
 from usdhand.report.preview.page import figure, page
 from usdhand.report.preview.summary import preview_result, summary
 from usdhand.requests.preview import PreviewRequest, PreviewSettings
-from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_hands
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_of, find_hands, rig_files
 from usdhand.verbs.files import check_several, find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -253,7 +253,7 @@ def run(request: PreviewRequest, journal: Journal) -> Outcome:
         reports=request.reports,
         figures=request.figures,
         title=request.title,
-        conventions=load_conventions(*request.maps),
+        conventions=conventions_of(request),
     )
     for note in previewed.notes:
         journal.warn("preview", note)
@@ -261,7 +261,7 @@ def run(request: PreviewRequest, journal: Journal) -> Outcome:
     size = output.stat().st_size
     return Outcome(
         request,
-        (*inputs, *request.maps),
+        (*inputs, *rig_files(request)),
         lambda: preview_result(previewed.lanes, previewed.notes, size, output),
         summary,
         written=(output,),

@@ -30,8 +30,8 @@ from usdhand.report.plots.style import check_plots
 from usdhand.report.reduce import curve_data, fit_result, fit_summary, reduce_result, summary
 from usdhand.requests.reduce import ReduceRequest
 from usdhand.requests.shared import sides
-from usdhand.rigs import Conventions, load_conventions
-from usdhand.verbs.clips import find_all_hands, find_hands
+from usdhand.rigs import Conventions
+from usdhand.verbs.clips import conventions_of, find_all_hands, find_hands, rig_files
 from usdhand.verbs.files import check_several, find_files
 from usdhand.verbs.outcome import Journal, Outcome
 
@@ -186,12 +186,12 @@ def run(request: ReduceRequest, journal: Journal) -> Outcome:
         return _fit_only(request, journal)
     paths = find_files(request.clips)
     outputs = _outputs(paths, request.output)
-    inputs = [*paths, *([request.rig] if request.rig else []), *request.maps]
+    inputs = [*paths, *([request.rig] if request.rig else []), *rig_files(request)]
     _check_fitting(request)
     _check_outputs(outputs, inputs, request)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
-    conventions = load_conventions(*request.maps)
+    conventions = conventions_of(request)
     rig = read_rig(request.rig) if request.rig else None
     clips = [read_clip(path, request.skel) for path in journal.each(paths, "reading")]
     for clip in clips:
@@ -242,7 +242,7 @@ def _fit_only(request: ReduceRequest, journal: Journal) -> Outcome:
         raise UsageError("--fit-only writes one file without a character; --flatten has no use.")
     _check_fitting(request)
     own = written_files(request.output)
-    check_outputs(own, [*paths, *request.maps], request.force, USD_SUFFIXES)
+    check_outputs(own, [*paths, *rig_files(request)], request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, curve.NAMES, request.force)
 
@@ -252,7 +252,7 @@ def _fit_only(request: ReduceRequest, journal: Journal) -> Outcome:
             journal.about(clip.origin.path, clip.problems, "warning")
             yield replace(clip, source=None)
 
-    conventions = load_conventions(*request.maps)
+    conventions = conventions_of(request)
     evidence = gather(_encoded(reading(), conventions, sides(request.side)))
     rig = fit_evidence(evidence, request.settings)
     if not request.dry_run:
@@ -265,7 +265,7 @@ def _fit_only(request: ReduceRequest, journal: Journal) -> Outcome:
 
     return Outcome(
         request,
-        (*paths, *request.maps),
+        (*paths, *rig_files(request)),
         report,
         fit_summary,
         figures=lambda: curve.figures(rig, evidence, request.settings),

@@ -29,11 +29,11 @@ from usdhand.requests.edits import read_pins
 from usdhand.requests.shared import sides
 from usdhand.requests.splice import SpliceRequest
 from usdhand.requests.takes import TakeFile, read_manifest
-from usdhand.rigs import Conventions, load_conventions
+from usdhand.rigs import Conventions
 from usdhand.splice.method import Spliced, splice
 from usdhand.splice.settings import Pin, SpliceSettings
 from usdhand.splice.takes import Take, splice_takes
-from usdhand.verbs.clips import find_hands, misleading_names
+from usdhand.verbs.clips import conventions_of, find_hands, misleading_names, rig_files
 from usdhand.verbs.outcome import Journal, Outcome
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
     check_outputs(outputs, [body, *files], request.force, USD_SUFFIXES)
     if request.plots is not None:
         check_plots(request.plots, plotting.NAMES, request.force)
-    conventions = load_conventions(*request.maps)
+    conventions = conventions_of(request)
     clip = read_clip(body, request.skel)
     clips = [_hand_clip(take) for take in takes]
     for take in takes:
@@ -251,7 +251,7 @@ def run(request: SpliceRequest, journal: Journal) -> Outcome:
     more = [f for f in (request.manifest, request.edits) if f is not None]
     return Outcome(
         request,
-        (body, *files, *more, *request.maps),
+        (body, *files, *more, *rig_files(request)),
         report,
         summary,
         settings={"pins": [p for take in takes for p in take.pins]},
