@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 from builders.clips import joints_of
+from builders.moving_hands import at_bind
+from builders.rigs import Joint, build
+from pxr import Usd, UsdSkel, Vt
 
 import usdhand
 from usdhand.anatomy import Hands, Side
@@ -40,3 +47,44 @@ def palm(skeleton: Skeleton, hands: Hands, side: Side) -> np.ndarray:
 
 def degrees_apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.degrees(np.arccos(np.clip((np.trace(a.T @ b) - 1) / 2, -1, 1))))
+
+
+BODY_ROLES = ("hips", "chest", "neck", "head", "clavicle", "shoulder", "elbow", "wrist")
+
+
+def named_body(names: Mapping[Joint, str], frames: int = 60) -> Clip:
+    """A body whose arms move and which has no fingers, with the joint names of some rig."""
+    rig, index = build({joint: name for joint, name in names.items() if joint[1] in BODY_ROLES})
+    order = list(rig.order)
+    place = {old: new for new, old in enumerate(order)}
+    clip = at_bind(
+        Skeleton(
+            tuple(rig.joints[j] for j in order),
+            np.array([place.get(int(rig.parents[j]), -1) for j in order]),
+            rig.bind[order],
+            rig.rest[order],
+        ),
+        frames,
+    )
+    rotations = clip.rotations.copy()
+    swing = 0.6 * np.sin(np.arange(frames) / 10.0)
+    for (side, role), joint in index.items():
+        if role in ("shoulder", "elbow"):
+            angle = swing if side == "left" else -swing
+            turn = rot.from_axis_angle(np.tile([0.0, 0.6, 0.8], (frames, 1)), angle)
+            at = place[joint]
+            rotations[:, at] = rot.multiply(rotations[:, at], turn)
+    return replace(clip, rotations=rotations)
+
+
+def with_raw_names(path: Path, joints: tuple[str, ...]) -> None:
+    """Give the joints of a file names that USD does not take as prims, as some exporters do."""
+    stage = Usd.Stage.Open(str(path))
+    for prim in stage.Traverse():
+        if prim.IsA(UsdSkel.Skeleton) or prim.IsA(UsdSkel.Animation):
+            prim.GetAttribute("joints").Set(Vt.TokenArray(list(joints)))
+            for attribute in [
+                a.GetName() for a in prim.GetAttributes() if "usdhand" in a.GetName()
+            ]:
+                prim.RemoveProperty(attribute)
+    stage.GetRootLayer().Save()

@@ -182,8 +182,7 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
         result = fill_result(filled, library, body)
         result["output"] = None if request.dry_run else str(output)
         if added:
-            joints = {hand: list(paths) for hand, paths in added.grafted.added.items()}
-            result |= {"added_joints": joints, "fingers_from": added.source}
+            result |= {"added_joints": added.joints, "fingers_from": added.source}
         return result
 
     def figures() -> dict[str, Figure]:

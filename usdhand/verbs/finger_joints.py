@@ -13,6 +13,7 @@ from usdhand.anatomy import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError, UsdHandError
 from usdhand.fill.library import LibraryClip, MotionLibrary
 from usdhand.formats.files import read_character, read_clip
+from usdhand.formats.usd.names import legal_skeleton
 from usdhand.motion import Clip
 from usdhand.problems import listed
 from usdhand.requests.fill import FillRequest
@@ -36,6 +37,13 @@ class WithFingers:
 
     grafted: Grafted
     source: str
+
+    @property
+    def joints(self) -> dict[Side, list[str]]:
+        """Paths of the added joints by hand, as they are written."""
+        skeleton = self.grafted.clip.skeleton
+        written = dict(zip(skeleton.joints, legal_skeleton(skeleton).joints, strict=True))
+        return {side: [written[p] for p in paths] for side, paths in self.grafted.added.items()}
 
 
 def lacks_fingers(

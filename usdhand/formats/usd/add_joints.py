@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, UsdSkel, Vt
 
-from usdhand.formats.usd.names import ALIASES, ORIGINALS
+from usdhand.formats.usd.names import ALIASES, ORIGINALS, legal_skeleton
 from usdhand.formats.usd.stage import Character
 from usdhand.formats.usd.world import World, world_above
 from usdhand.motion import Skeleton
@@ -65,6 +65,35 @@ def author_joints(layer: Sdf.Layer, character: Character, skeleton: Skeleton) ->
     for name, kept in ((ORIGINALS, skeleton.originals), (ALIASES, skeleton.aliases)):
         if kept:
             _set(spec, name, types.TokenArray, Vt.TokenArray(list(kept)), custom=True)
+
+
+def author_legal_names(
+    layer: Sdf.Layer, character: Character, skeleton: Skeleton, animation: Sdf.Path
+) -> None:
+    """Rename joints that USD does not take as prims, on a Skeleton that gains joints.
+
+    As they are, USD sees no hierarchy in them, so that the joints added would hang off nothing. The
+    Skeleton keeps their own names beside (`author_names`); the new animation and the meshes that
+    list joints of this Skeleton follow.
+    """
+    own, legal = joint_tokens(character), legal_skeleton(skeleton)
+    if len(skeleton) == len(own) or legal.joints == skeleton.joints:
+        return
+    renamed = dict(zip(skeleton.joints, legal.joints, strict=True))
+    kind = Sdf.ValueTypeNames.TokenArray
+    spec = Sdf.CreatePrimInLayer(layer, character.skeleton.GetPath())
+    _set(spec, "joints", kind, Vt.TokenArray(list(legal.joints)))
+    for name, kept in ((ORIGINALS, legal.originals), (ALIASES, legal.aliases)):
+        if kept:
+            _set(spec, name, kind, Vt.TokenArray(list(kept)), custom=True)
+    moved = layer.GetPrimAtPath(animation).attributes["joints"]
+    moved.default = Vt.TokenArray([renamed[str(joint)] for joint in moved.default])
+    for prim in character.stage.Traverse():
+        binding = UsdSkel.BindingAPI(prim)
+        listed = [str(joint) for joint in binding.GetJointsAttr().Get() or ()]
+        if listed and binding.GetInheritedSkeleton().GetPrim() == character.skeleton:
+            names = Vt.TokenArray([renamed.get(joint, joint) for joint in listed])
+            _set(Sdf.CreatePrimInLayer(layer, prim.GetPath()), "skel:joints", kind, names)
 
 
 def _set(

@@ -15,7 +15,7 @@ from usdhand.formats.atomic import ended_by_exception, written_beside
 from usdhand.formats.output import check_outputs
 from usdhand.formats.paths import relative_path, written_files
 from usdhand.formats.suffixes import USD_SUFFIXES
-from usdhand.formats.usd.add_joints import author_joints, joint_tokens
+from usdhand.formats.usd.add_joints import author_joints, author_legal_names, joint_tokens
 from usdhand.formats.usd.animation import animation_losses, author_animation, author_variants
 from usdhand.formats.usd.bindings import bind_animation
 from usdhand.formats.usd.character import as_on_stage
@@ -130,6 +130,7 @@ def write_motion(
         if character.animation is not None:
             copy_blend_shapes(layer, animation, UsdSkel.Animation(character.animation))
         shared = bind_animation(layer, character, animation)
+        author_legal_names(layer, character, skeleton, animation)
         if not within_samples(character, times):  # else the input says what of them is shown
             extend_time(layer, times)
         if author is not None:
