@@ -10,6 +10,7 @@ of another rig, filled from FOLDER and the reverse.
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -72,7 +73,7 @@ def main() -> None:
 
 
 def build(files: Sequence[Path], folder: Path) -> MotionLibrary:
-    return build_library(files, folder / "library.usdc").library
+    return build_library(files, folder / "library.usdc", keep=math.inf).library  # no file beside
 
 
 def errors_of(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from pxr import Usd, UsdSkel, Vt
 
 import usdhand
 from usdhand.anatomy import Hands, Side
+from usdhand.anatomy.hand import digit_joints
 from usdhand.motion import Clip, Skeleton, parents_from_paths
 from usdhand.motion import rotations as rot
 from usdhand.rigs.graft import Grafted, add_finger_joints
@@ -52,9 +53,13 @@ def degrees_apart(a: np.ndarray, b: np.ndarray) -> float:
 BODY_ROLES = ("hips", "chest", "neck", "head", "clavicle", "shoulder", "elbow", "wrist")
 
 
-def named_body(names: Mapping[Joint, str], frames: int = 60) -> Clip:
-    """A body whose arms move and which has no fingers, with the joint names of some rig."""
-    rig, index = build({joint: name for joint, name in names.items() if joint[1] in BODY_ROLES})
+def named_body(names: Mapping[Joint, str], frames: int = 60, digits: Sequence[str] = ()) -> Clip:
+    """A body whose arms move and which has no fingers, with the joint names of some rig.
+
+    ``digits`` are fingers that it has all the same.
+    """
+    roles = {*BODY_ROLES, *(d + joint for d in digits for joint in digit_joints(d))}
+    rig, index = build({joint: name for joint, name in names.items() if joint[1] in roles})
     order = list(rig.order)
     place = {old: new for new, old in enumerate(order)}
     clip = at_bind(

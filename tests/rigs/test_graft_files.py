@@ -144,8 +144,24 @@ def test_a_library_whose_files_are_gone(tmp_path: Path) -> None:
     (clips / "ok_01.usdc").unlink()
     body, out = bare_file(BODY, tmp_path / "body.usdc"), tmp_path / "out.usda"
     arguments = ("fill", body, "--library", library, "-o", out)
-    assert "--fingers-from" in run(*arguments, "--add-fingers", code=3).output
-    run(*arguments, "--fingers-from", BEN)
+    report = json.loads(run(*arguments, "--add-fingers", "--json").stdout)
+    assert report["fingers_from"].endswith("clips/ok_01.usdc")
+    other = tmp_path / "other.usda"
+    run("fill", body, "--library", library, "-o", other, "--fingers-from", BEN)
+    found, expected = usdhand.read_clip(out), usdhand.read_clip(other)
+    assert found.skeleton.joints == expected.skeleton.joints
+    assert_allclose(found.skeleton.bind, expected.skeleton.bind, atol=1e-9)
+    # Someone removes the hands, or breaks them.
+    stage = Usd.Stage.Open(str(library))
+    [clip] = stage.GetPrimAtPath("/Library/Clips").GetChildren()
+    clip.GetAttribute("usdhand:left:shape:parents").Set(Vt.TokenArray(["ThumbIP"] * 3))
+    stage.GetRootLayer().Save()
+    assert "wrong type" in run(*arguments, "--add-fingers", "--force", code=3).output
+    for attribute in [a for a in clip.GetAttributes() if ":shape:" in a.GetName()]:
+        clip.RemoveProperty(attribute.GetName())
+    stage.GetRootLayer().Save()
+    assert "--fingers-from" in run(*arguments, "--add-fingers", "--force", code=3).output
+    run(*arguments, "--fingers-from", BEN, "--force")
 
 
 def test_a_skeleton_without_poses(library: Path, tmp_path: Path) -> None:

@@ -16,6 +16,9 @@ from conftest import REPOSITORY
 from pxr import Usd, UsdGeom, UsdSkel, Vt
 
 import usdhand
+from usdhand.anatomy import SIDES
+from usdhand.anatomy.hand import digit_joints
+from usdhand.formats.usd.names import legal_name
 
 BODIES = (
     "humanik", "mixamo", "unreal", "rigify", "unity_humanoid", "unity_spaced", "vroid", "smplx",
@@ -69,6 +72,42 @@ def test_bodies_of_many_conventions_gain_fingers(name: str, library: Path, tmp_p
     assert np.abs(after.rotations[:, :count] - before.rotations).max() < 1e-6
 
 
+@pytest.mark.parametrize("digit", ["Thumb", "Index"])
+@pytest.mark.parametrize("name", ["humanik", "mixamo", "unreal", "rigify"])
+def test_a_whole_digit_stays_or_is_replaced(
+    name: str, digit: str, library: Path, tmp_path: Path
+) -> None:
+    """No hand has six digits unasked."""
+    names, body = known_rigs()[name], tmp_path / "body.usdc"
+    usdhand.write_clip(named_body(names, digits=[digit]), body)
+    own = {names[side, digit + joint] for side in SIDES for joint in digit_joints(digit)}
+    arguments = ("fill", body, "--library", library, "--add-fingers", "--json", "-o")
+    kept = run(*arguments, tmp_path / "kept.usdc")
+    assert "--replace-fingers adds a new" in kept.stderr
+    assert "beside" not in kept.stderr
+    added = [p for paths in json.loads(kept.stdout)["added_joints"].values() for p in paths]
+    assert not any(digit.lower() in path.rsplit("/", 1)[-1].lower() for path in added)
+    clip = usdhand.read_clip(tmp_path / "kept.usdc")
+    hands = usdhand.find_hands(clip)
+    assert hands.character.convention in (name, "humanik")
+    joints = {clip.skeleton.names[j] for f in hands.frames.values() for j in f.joints}
+    assert {side: len(f.names) for side, f in hands.frames.items()} == {"left": 15, "right": 15}
+    assert {legal_name(joint) for joint in own} <= {legal_name(joint) for joint in joints}
+    whole = run(*arguments, tmp_path / "whole.usdc", "--replace-fingers")
+    assert "stays beside the added" in whole.stderr
+    hands = usdhand.find_hands(usdhand.read_clip(tmp_path / "whole.usdc"))
+    assert {side: len(f.names) for side, f in hands.frames.items()} == {"left": 15, "right": 15}
+
+
+def test_replacing_fingers_needs_some_to_add(library: Path, tmp_path: Path) -> None:
+    body = tmp_path / "body.usdc"
+    usdhand.write_clip(named_body(known_rigs()["humanik"]), body)
+    text = run(
+        "fill", body, "--library", library, "-o", tmp_path / "o.usda", "--replace-fingers", code=2
+    ).output
+    assert "--replace-fingers is for --add-fingers" in text
+
+
 @pytest.mark.parametrize("name", ["rigify", "biped"])
 def test_bvh_bodies_gain_fingers(name: str, library: Path, tmp_path: Path) -> None:
     _, out, _ = filled(name, library, tmp_path, ".bvh")
@@ -99,7 +138,7 @@ def test_meshes_that_list_joints_follow_their_new_names(library: Path, tmp_path:
 
 
 @pytest.mark.blender
-@pytest.mark.parametrize("name", ["rigify", "biped", "unity_spaced", "mixamo"])
+@pytest.mark.parametrize("name", BODIES)
 def test_blender_loads_one_armature_with_fingers(name: str, library: Path, tmp_path: Path) -> None:
     _, out, report = filled(name, library, tmp_path)
     script = tmp_path / "count.py"

@@ -18,6 +18,7 @@ from usdhand.motion import Clip
 from usdhand.motion.resample import interpolate
 from usdhand.motion.rotations import Array
 from usdhand.problems import Problem
+from usdhand.rigs.graft import HandShape, hand_shapes
 from usdhand.rigs.height import body_height
 
 # Arms are searched at this rate; fingers keep that of their clip.
@@ -88,6 +89,7 @@ class LibraryClip:
     fps : of the fingers
     duration : seconds
     content_hash : SHA-256 of the file
+    shapes : hands of the character at its bind pose, those that do not move among them
     """
 
     name: str
@@ -100,6 +102,7 @@ class LibraryClip:
     duration: float
     content_hash: str
     hands: Mapping[Side, LibraryHand]
+    shapes: Mapping[Side, HandShape] = field(default_factory=dict)
 
 
 @displayed(
@@ -184,6 +187,7 @@ def library_clip(
         clip.duration,
         content_hash,
         library_hands(clip, hands, segmentation),
+        hand_shapes(clip.skeleton, hands),
     )
 
 

@@ -54,6 +54,10 @@ class FillRequest(Request):
         default=None,
         metavar="CHARACTER",
     )
+    replace_fingers: bool = option(
+        "Add whole hands also where the body has a whole thumb or finger, which stays still.",
+        default=False,
+    )
     side: shared.Sides = shared.side()
     flatten: bool = shared.flatten()
     allow_outside: bool = shared.allow_outside()

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from usdhand.anatomy import SIDES, CharacterMap, Side
-from usdhand.anatomy.hand import ARM_JOINTS, BODY_JOINTS, HAND_JOINTS, HandMap
+from usdhand.anatomy.hand import (
+    ARM_JOINTS,
+    BODY_JOINTS,
+    DIGITS,
+    HAND_JOINTS,
+    HandMap,
+    digit_joints,
+)
 from usdhand.motion.skeleton import Skeleton, leaf_name
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.rigs.body import arm_joints, body_of
@@ -80,6 +87,30 @@ def fingerless_arms(
     convention = None if named_by_file or found is None else found.convention
     name = convention.name if convention else "map file"
     return FingerlessArms(CharacterMap(hands, name, **body), convention)
+
+
+def own_digits(skeleton: Skeleton, arms: FingerlessArms, side: Side) -> dict[str, list[str]]:
+    """Names of the joints of digits that are whole, by digit: a lone thumb or index chain.
+
+    They are those that the skeleton's naming has; joints called otherwise are no digits.
+    """
+    if arms.convention is None:
+        return {}
+    wrist = arms.character.hands[side].wrist
+    names = arms.convention.hands.get(side, {})
+    before, after = _affixes(leaf_name(skeleton.joints[wrist]), names.get("wrist", ()))
+    below: dict[str, str] = {}
+    for joint in sorted(skeleton.descendants(wrist)):
+        below.setdefault(name_key(skeleton.names[joint]), skeleton.names[joint])
+    found: dict[str, list[str]] = {}
+    for digit in DIGITS:
+        chain = []
+        for role in (digit + joint for joint in digit_joints(digit)):
+            keys = (name_key(before + name + after) for name in names.get(role, ()))
+            chain += [below[key] for key in keys if key in below][:1]
+        if len(chain) == len(digit_joints(digit)):
+            found[digit] = chain
+    return found
 
 
 def finger_names(

@@ -18,7 +18,7 @@ from usdhand.motion.transforms import affine, rigid, unit
 from usdhand.rigs import Conventions, load_conventions
 from usdhand.rigs.body import body_of, joint_points
 from usdhand.rigs.conventions import METACARPALS, TIPS
-from usdhand.rigs.fingerless import FingerlessArms, finger_names, fingerless_arms
+from usdhand.rigs.fingerless import FingerlessArms, finger_names, fingerless_arms, own_digits
 from usdhand.rigs.height import body_height
 
 # A joint below the wrist tells the hand's direction if it is this far away, in forearms, and not
@@ -84,6 +84,22 @@ def add_finger_joints(
     HandNotFoundError
         if no arm without fingers is found on these sides.
     """
+    return graft_hands(clip, hand_shapes(donor, donor_hands), conventions, sides)
+
+
+def graft_hands(
+    clip: Clip,
+    shapes: Mapping[Side, HandShape],
+    conventions: Conventions | None = None,
+    sides: Sequence[Side] = ("left", "right"),
+    *,
+    replace_fingers: bool = False,
+) -> Grafted:
+    """Give a body hands of these shapes; see `add_finger_joints`.
+
+    A whole digit that the body has stays the only one of its kind, unless fingers are replaced:
+    then another one is added beside it.
+    """
     conventions = conventions or load_conventions()
     arms = fingerless_arms(clip.skeleton, conventions)
     wanted = [side for side in sides if arms and side in arms.character.hands]
@@ -94,8 +110,10 @@ def add_finger_joints(
         )
     added: dict[Side, tuple[str, ...]] = {}
     for side in wanted:
-        shape = hand_shape(donor, donor_hands, side)
-        names = finger_names(clip.skeleton, arms, side, shape.roles, conventions)
+        shape = _shape_of(shapes, side)
+        kept = {} if replace_fingers else own_digits(clip.skeleton, arms, side)
+        roles = [role for role in shape.roles if not role.startswith(tuple(kept))]
+        names = finger_names(clip.skeleton, arms, side, roles, conventions)
         before = len(clip.skeleton)
         clip = _with_hand(clip, arms, shape, names)
         added[side] = clip.skeleton.joints[before:]
@@ -104,8 +122,25 @@ def add_finger_joints(
 
 def hand_shape(skeleton: Skeleton, hands: Hands, side: Side) -> HandShape:
     """A character's hand at its bind pose; the other one mirrored where it has only one."""
-    own = side if side in hands.frames else next(iter(hands.frames))
-    hand, frames = hands.character.hands[own], hands.frames[own]
+    return _shape_of(hand_shapes(skeleton, hands), side)
+
+
+def hand_shapes(skeleton: Skeleton, hands: Hands) -> dict[Side, HandShape]:
+    """A character's hands at its bind pose."""
+    return {side: _own_shape(skeleton, hands, side) for side in hands.frames}
+
+
+def _shape_of(shapes: Mapping[Side, HandShape], side: Side) -> HandShape:
+    if side in shapes:
+        return shapes[side]
+    other = next(iter(shapes.values()))
+    mirror = np.array([1.0, -1.0, 1.0])  # across the palm: flexion axes point the other way
+    turned = -mirror[:, None] * other.rotations
+    return replace(other, side=side, positions=other.positions * mirror, rotations=turned)
+
+
+def _own_shape(skeleton: Skeleton, hands: Hands, side: Side) -> HandShape:
+    hand, frames = hands.character.hands[side], hands.frames[side]
     palm = skeleton.bind_rotations[hand.wrist] @ rot.to_matrix(frames.palm)
     places = dict(hand.joints)
     places |= {METACARPALS[d]: j for d, j in hand.metacarpals.items() if d in METACARPALS}
@@ -122,10 +157,6 @@ def hand_shape(skeleton: Skeleton, hands: Hands, side: Side) -> HandShape:
     indices = list(joints.values())
     positions = (skeleton.bind_positions[indices] - skeleton.bind_positions[hand.wrist]) @ palm
     rotations = palm.T @ skeleton.bind_rotations[indices]
-    if own != side:
-        mirror = np.array([1.0, -1.0, 1.0])  # across the palm: flexion axes point the other way
-        positions = positions * mirror
-        rotations = -mirror[:, None] * rotations
     return HandShape(
         side,
         tuple(joints),

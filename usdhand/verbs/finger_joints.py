@@ -10,25 +10,24 @@ from pathlib import Path
 import numpy as np
 
 from usdhand.anatomy import HAND_JOINTS, SIDES, Side
-from usdhand.errors import InputError, UsdHandError
+from usdhand.errors import InputError, UsageError
 from usdhand.fill.library import LibraryClip, MotionLibrary
-from usdhand.formats.files import read_character, read_clip
+from usdhand.formats.files import read_character
 from usdhand.formats.usd.names import legal_skeleton
 from usdhand.motion import Clip
 from usdhand.problems import listed
 from usdhand.requests.fill import FillRequest
 from usdhand.requests.shared import sides as sides_of
 from usdhand.rigs import Conventions
-from usdhand.rigs.fingerless import fingerless_arms
-from usdhand.rigs.graft import Grafted, add_finger_joints
+from usdhand.rigs.fingerless import fingerless_arms, own_digits
+from usdhand.rigs.graft import Grafted, graft_hands, hand_shapes
 from usdhand.rigs.height import body_height
 from usdhand.verbs.clips import find_hands
 from usdhand.verbs.outcome import Journal
 
 _FINGER = re.compile(r"thumb|index|middle|ring|pinky|little", re.IGNORECASE)
 
-# Characters of a library that are tried, most fitting first, before it is said that none is there.
-TRIED = 8
+HAND_ROLES = set(HAND_JOINTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +53,16 @@ def lacks_fingers(
     return [side for side in sides if arms is not None and side in arms.character.hands]
 
 
+def whole_digits(
+    clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
+) -> dict[Side, dict[str, list[str]]]:
+    """Names of the joints of whole digits that a body without whole hands has."""
+    arms = fingerless_arms(clip.skeleton, conventions)
+    there = [side for side in sides if arms and side in arms.character.hands]
+    found = {side: own_digits(clip.skeleton, arms, side) for side in there if arms}
+    return {side: digits for side, digits in found.items() if digits}
+
+
 def finger_stubs(
     clip: Clip, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
 ) -> dict[Side, list[str]]:
@@ -70,74 +79,59 @@ def finger_stubs(
 
 
 def fingers_like(
-    clip: Clip, source: Path, conventions: Conventions | None = None, sides: Sequence[Side] = SIDES
+    clip: Clip,
+    source: Path,
+    conventions: Conventions | None = None,
+    sides: Sequence[Side] = SIDES,
+    *,
+    replace: bool = False,
 ) -> WithFingers:
     """Give a body the finger joints of a character in a file."""
     donor = read_character(source)
-    hands = find_hands(donor, conventions)
-    return WithFingers(
-        add_finger_joints(clip, donor.skeleton, hands, conventions, sides), str(source)
-    )
+    shapes = hand_shapes(donor.skeleton, find_hands(donor, conventions))
+    made = graft_hands(clip, shapes, conventions, sides, replace_fingers=replace)
+    return WithFingers(made, str(source))
 
 
 def fingers_from_library(
     clip: Clip,
     library: MotionLibrary,
-    folder: Path,
     conventions: Conventions | None = None,
     sides: Sequence[Side] = SIDES,
+    *,
+    replace: bool = False,
 ) -> WithFingers:
     """Give a body the finger joints of the library's character that fits best.
 
     That is one with most hand joints, and of those the one nearest in height.
 
-    Parameters
-    ----------
-    folder : of the library, which its clips' paths are relative to
-
     Raises
     ------
     InputError
-        if the files of the library's clips cannot be read.
+        if the library has no character's hands.
     """
-    reasons: list[str] = []
-    for entry in _by_fit(clip, library, conventions)[:TRIED]:
-        try:
-            donor = read_clip(folder / entry.path, entry.skel or None)
-            hands = find_hands(donor, conventions)
-        except UsdHandError as error:
-            reasons.append(str(error))
-            continue
-        return WithFingers(
-            add_finger_joints(clip, donor.skeleton, hands, conventions, sides), entry.path
+    donor = _most_fitting(clip, library, conventions)
+    if donor is None:
+        raise InputError(
+            "The library has no character's hands to take finger joints from; someone removed "
+            "them. Choose a character with --fingers-from."
         )
-    raise InputError(
-        "No character of the library can be read to take finger joints from "
-        f"({reasons[0] if reasons else 'the library is empty'}). Choose one with --fingers-from."
-    )
+    made = graft_hands(clip, donor.shapes, conventions, sides, replace_fingers=replace)
+    return WithFingers(made, donor.path)
 
 
-def _by_fit(
+def _most_fitting(
     clip: Clip, library: MotionLibrary, conventions: Conventions | None
-) -> list[LibraryClip]:
-    """A clip of each character, the most fitting one first."""
+) -> LibraryClip | None:
     arms = fingerless_arms(clip.skeleton, conventions)
     height = body_height(clip.skeleton, arms.character) if arms else 1.0
 
     def fit(entry: LibraryClip) -> tuple[int, float, str]:
-        joints = sum(len(hand.joints) for hand in entry.hands.values())
+        joints = sum(len(set(shape.roles) & HAND_ROLES) for shape in entry.shapes.values())
         away = abs(float(np.log(entry.height / height)))
-        return min(2 * len(HAND_JOINTS), joints), -round(away, 3), entry.name
+        return -joints, round(away, 3), entry.name
 
-    def character(entry: LibraryClip) -> tuple[str, float]:
-        return entry.skel, round(entry.height, 1)
-
-    first: dict[tuple[str, float], LibraryClip] = {}
-    for entry in sorted(library.clips, key=lambda e: e.name):
-        first.setdefault(character(entry), entry)
-    joints_then_height = sorted(first.values(), key=lambda e: (-fit(e)[0], -fit(e)[1], e.name))
-    # Where a character's first clip is gone, its others may be there.
-    return joints_then_height + [e for e in library.clips if first[character(e)] is not e]
+    return min((entry for entry in library.clips if entry.shapes), key=fit, default=None)
 
 
 def add_fingers(
@@ -148,9 +142,11 @@ def add_fingers(
     journal: Journal,
 ) -> WithFingers | None:
     """Add the finger joints that a request asks for, where the body has none; else say so."""
-    wanted = sides_of(request.side)
+    wanted, replace = sides_of(request.side), request.replace_fingers
     bare = lacks_fingers(clip, conventions, wanted)
     if not (request.add_fingers or request.fingers_from):
+        if replace:
+            raise UsageError("--replace-fingers is for --add-fingers or --fingers-from.")
         if bare and len(bare) < len(wanted):
             message = f"the {bare[0]} hand has no finger joints; --add-fingers adds some"
             journal.warn("no-finger-joints", message, request.body)
@@ -159,12 +155,22 @@ def add_fingers(
         journal.warn("has-fingers", f"{request.body} has finger joints, so none are added")
         return None
     if request.fingers_from:
-        added = fingers_like(clip, request.fingers_from, conventions, bare)
+        added = fingers_like(clip, request.fingers_from, conventions, bare, replace=replace)
     else:
-        folder = request.library.absolute().parent
-        added = fingers_from_library(clip, library, folder, conventions, bare)
+        added = fingers_from_library(clip, library, conventions, bare, replace=replace)
+    kept = {} if replace else whole_digits(clip, conventions, bare)
+    for hand, digits in kept.items():
+        names = [name for chain in digits.values() for name in chain]
+        what = " and ".join(digit.lower() for digit in digits)
+        message = (
+            f"{hand} hand: {listed(names)} stays its {what}; --replace-fingers adds a new {what}"
+        )
+        journal.warn("kept-fingers", message)
     for hand, stubs in finger_stubs(clip, conventions, bare).items():
-        what = "thumb" if all("thumb" in name.lower() for name in stubs) else "fingers"
-        message = f"{hand} hand: {listed(stubs)} stays beside the added {what}"
-        journal.warn("finger-stub", message)
+        own = {name for chain in kept.get(hand, {}).values() for name in chain}
+        stubs = [name for name in stubs if name not in own]
+        if stubs:
+            what = "thumb" if all("thumb" in name.lower() for name in stubs) else "fingers"
+            message = f"{hand} hand: {listed(stubs)} stays beside the added {what}"
+            journal.warn("finger-stub", message)
     return added

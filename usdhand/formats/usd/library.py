@@ -32,6 +32,7 @@ from usdhand.formats import paths
 from usdhand.formats.output import check_outputs
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.damage import damage_refused, refuses_damage, usd_diagnostics
+from usdhand.formats.usd.hand_shapes import read_shapes, shape_values
 from usdhand.formats.usd.stage import Character, compose, open_stage
 from usdhand.formats.usd.write import describe_layer, save_layer
 from usdhand.motion import Clip
@@ -219,6 +220,8 @@ def _write_clip(layer: Sdf.Layer, clip: LibraryClip, name: str) -> None:
         motion = _prim(layer, f"{prim.path}/Motion", "")
         first = Sdf.Path(clip.skel).GetPrefixes()[0] if clip.skel else Sdf.Path.emptyPath
         motion.payloadList.prependedItems = [Sdf.Payload(clip.path, first)]
+    for side, shape in clip.shapes.items():
+        _set_all(prim, {f"{side}:{name}": value for name, value in shape_values(shape).items()})
     for side, hand in clip.hands.items():
         segments = np.array(hand.segments, dtype=np.int32).reshape(-1, 2)
         _set_all(
@@ -260,6 +263,8 @@ def _read_clip(prim: Usd.Prim) -> LibraryClip:
             for side in SIDES
             if _get(prim, f"{side}:joints") is not None
         }
+        height = positive("height")
+        shapes = read_shapes(prim, height)
     except (TypeError, ValueError) as error:
         raise _DamagedError(f"its arrays have the wrong type ({error})") from error
     if not hands:
@@ -270,11 +275,12 @@ def _read_clip(prim: Usd.Prim) -> LibraryClip:
         str(_get(prim, "skeleton", "")),
         str(_get(prim, "label", "")),
         str(_get(prim, "actor", "")),
-        positive("height"),
+        height,
         positive("fps"),
         positive("duration"),
         content,
         cast(Mapping[Side, LibraryHand], hands),
+        shapes,
     )
 
 
