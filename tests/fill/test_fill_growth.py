@@ -121,8 +121,9 @@ def test_a_hold_between_gestures_is_filled(library: MotionLibrary) -> None:
 
 
 def test_a_library_keeps_an_hour_of_gestures_and_a_hold() -> None:
-    clip = followed_by(long_clip(HOUR), still_clip(HOUR))
-    library = library_of(replace(clip, name="long"))
+    moving, hold = long_clip(HOUR), still_clip(HOUR)
+    held = hold.with_rotations(np.broadcast_to(moving.rotations[-1], hold.rotations.shape))
+    library = library_of(replace(followed_by(moving, held), name="long"))
     for hand in library.clips[0].hands.values():
         assert len(hand.segments) > HOUR
         assert hand.segments[-1][1] == pytest.approx(2 * HOUR * ARM_FPS, abs=10)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usdhand.fill.arm import ArmMotion
-from usdhand.fill.library import ARM_FPS, MotionLibrary, Part
+from usdhand.fill.library import ARM_FPS, MotionLibrary, Part, hand_segments
 from usdhand.fill.metric import feature_rows
 from usdhand.fill.segment import segments, wrist_speed
 from usdhand.fill.settings import Metric, Segmentation
@@ -75,9 +75,9 @@ def search_space(
     for number, clip in enumerate(library.clips):
         if not set(part) <= set(clip.hands):
             continue
-        arms = [clip.hands[side].arm for side in part]
-        rows = part_rows(arms, metric)
-        cut = clip.hands[part[0]].segments if as_stored else part_segments(arms, cutting)
+        hands = [clip.hands[side] for side in part]
+        rows = part_rows([hand.arm for hand in hands], metric)
+        cut = hands[0].segments if as_stored else hand_segments(hands, cutting)
         for first, last in cut:
             clips.append(number)
             firsts.append(first)

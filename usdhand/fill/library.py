@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from usdhand.anatomy import Hands, Side
+from usdhand.anatomy.at_bind import moved_frames
 from usdhand.anatomy.channels import all_channels, fingers_move
 from usdhand.display import displayed
 from usdhand.errors import InputError
@@ -50,12 +51,15 @@ class LibraryHand:
     joints : hand joints that the rig has
     fingers : (frames, 3 joints) all channels in degrees, at the clip's rate
     segments : first and last frame of each segment, at `ARM_FPS`
+    used : first and last frame at `ARM_FPS` between the bind poses that a clip starts and ends
+        with; None for all frames
     """
 
     arm: ArmMotion
     joints: tuple[str, ...]
     fingers: Array
     segments: tuple[tuple[int, int], ...]
+    used: tuple[int, int] | None = None
 
     def curves_of(self, joints: Sequence[str]) -> Array:
         """(frames, 3 joints) channels of some of its joints."""
@@ -90,6 +94,7 @@ class LibraryClip:
     duration : seconds
     content_hash : SHA-256 of the file
     shapes : hands of the character at its bind pose, those that do not move among them
+    doubt : what is doubtful about its unit of length, "" if nothing
     """
 
     name: str
@@ -103,6 +108,7 @@ class LibraryClip:
     content_hash: str
     hands: Mapping[Side, LibraryHand]
     shapes: Mapping[Side, HandShape] = field(default_factory=dict)
+    doubt: str = ""
 
 
 @displayed(
@@ -145,24 +151,45 @@ def damage(arm: Array, fingers: Array) -> str:
 
 
 def library_hands(clip: Clip, hands: Hands, segmentation: Segmentation) -> dict[Side, LibraryHand]:
-    """What a library keeps of a clip's hands: those whose fingers move."""
+    """What a library keeps of a clip's hands: those whose fingers move away from the bind pose."""
     found: dict[Side, LibraryHand] = {}
     channels = hands.encode(clip)
     for side, frames in hands.frames.items():
         curves = channels.select(all_channels(side, frames.names)).values
-        if not fingers_move(curves):
+        moved = moved_frames(clip, frames)
+        if moved is None or not fingers_move(curves):
             continue
         arm = at_arm_rate(arm_motion(clip, hands, side), clip.fps)
         if reason := damage(pack_arm(arm), curves):
             raise InputError(f"{clip.origin.path or clip.name}: {side} hand: {reason}.")
-        speed = wrist_speed(arm.hips_position, ARM_FPS, segmentation.smoothing)
-        found[side] = LibraryHand(
-            arm,
-            frames.names,
-            curves,
-            tuple(segments(speed, ARM_FPS, segmentation)),
-        )
+        used = None if moved == (0, len(clip) - 1) else _at_arm_rate(moved, clip.fps, arm)
+        hand = LibraryHand(arm, frames.names, curves, (), used)
+        found[side] = replace(hand, segments=hand_segments([hand], segmentation))
     return found
+
+
+def hand_segments(
+    hands: Sequence[LibraryHand], segmentation: Segmentation
+) -> tuple[tuple[int, int], ...]:
+    """Segments of hands together: cut where the faster arm comes to rest, in frames of use."""
+    speeds = [wrist_speed(h.arm.hips_position, ARM_FPS, segmentation.smoothing) for h in hands]
+    speed = np.max(speeds, axis=0)
+    ends = [hand.used or (0, len(speed) - 1) for hand in hands]
+    start, end = max(first for first, _ in ends), min(last for _, last in ends)
+    if end <= start:
+        return ()
+    cut = segments(speed[start : end + 1], ARM_FPS, segmentation)
+    return tuple((first + start, last + start) for first, last in cut)
+
+
+def _at_arm_rate(moved: tuple[int, int], fps: float, arm: ArmMotion) -> tuple[int, int]:
+    first, last = (frame * ARM_FPS / fps for frame in moved)
+    end = len(arm.hips_position) - 1
+    return min(int(np.ceil(first)), end), min(int(last), end)
+
+
+def _is_doubt(problem: Problem) -> bool:
+    return problem.code == "guessed-units" and problem.severity == "warning"
 
 
 def library_clip(
@@ -188,6 +215,7 @@ def library_clip(
         content_hash,
         library_hands(clip, hands, segmentation),
         hand_shapes(clip.skeleton, hands),
+        next((p.message for p in clip.problems if _is_doubt(p)), ""),
     )
 
 

@@ -42,7 +42,8 @@ def read_clip(path: str | Path, skel: str | None = None, reading: Reading = DEFA
     UsageError
         if there are several skeletons or animations and none is chosen.
     """
-    path, reading = Path(path), _with_skel(reading, skel)
+    path = Path(path)
+    reading = _read_as(path, reading, skel)
     if is_usd(path):
         return usd.read_clip(path, _usd_skel(path, reading))
     return _remembered(_reader(path).read_clip(path, reading), animated=True)
@@ -58,7 +59,8 @@ def read_character(path: str | Path, skel: str | None = None, reading: Reading =
     UsageError
         if there are several skeletons and none is chosen.
     """
-    path, reading = Path(path), _with_skel(reading, skel)
+    path = Path(path)
+    reading = _read_as(path, reading, skel)
     if is_usd(path):
         return usd.read_character(path, _usd_skel(path, reading))
     return _remembered(_reader(path).read_character(path, reading), animated=False)
@@ -71,7 +73,8 @@ def read_any(
 
     Raises the errors of `read_character`.
     """
-    path, reading = Path(path), _with_skel(reading, skel)
+    path = Path(path)
+    reading = _read_as(path, reading, skel)
     if is_usd(path):
         return usd.motion_or_pose(find_character(path, _usd_skel(path, reading)))
     animated = bool(_reader(path).animation_names(path))
@@ -137,7 +140,9 @@ def _remembered(clip: Clip, *, animated: bool) -> Clip:
     return remembered(clip, animated=animated)
 
 
-def _with_skel(reading: Reading, skel: str | None) -> Reading:
+def _read_as(path: Path, reading: Reading, skel: str | None) -> Reading:
+    if reading.positions is not None and path.suffix.lower() != ".bvh":
+        raise UsageError(f"{path}: --positions is for BVH files only.")
     return reading if skel is None else replace(reading, skel=skel)
 
 

@@ -11,17 +11,25 @@ from dataclasses import dataclass, replace
 from numbers import Integral
 from pathlib import Path, PurePosixPath
 
+from usdhand.anatomy import Hands
+from usdhand.anatomy.at_bind import moved_frames
 from usdhand.display import displayed
 from usdhand.errors import InputError, UsageError, UsdHandError
-from usdhand.fill.library import LibraryClip, MotionLibrary, library_clip
+from usdhand.fill.library import (
+    LibraryClip,
+    MotionLibrary,
+    hand_segments,
+    library_clip,
+)
 from usdhand.fill.settings import Segmentation
 from usdhand.formats.files import read_clip
 from usdhand.formats.hashing import file_hash
 from usdhand.formats.usd.library import is_library, read_library, relative_path, write_library
+from usdhand.motion import Clip
 from usdhand.problems import Problem
 from usdhand.progress import Progress, each
 from usdhand.rigs import Conventions
-from usdhand.verbs.clips import find_hands
+from usdhand.verbs.clips import find_hands, misleading_names
 from usdhand.verbs.files import check_several
 from usdhand.workers import each_apart
 
@@ -40,7 +48,8 @@ class BuildResult:
     """A built library, and how many of its clips were read now or kept unchanged.
 
     ``unmatched`` are files that have labels but are not among the clips;
-    ``removed`` are clips of the old library that were not given this time.
+    ``removed`` are clips of the old library that were not given this time;
+    ``problems`` are what is odd about clips that were read now and are used.
     """
 
     library: MotionLibrary
@@ -48,6 +57,11 @@ class BuildResult:
     unchanged: int
     unmatched: tuple[str, ...] = ()
     removed: tuple[LibraryClip, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+
+# A clip that was read, or why it is left out; and what is odd about it.
+_Read = tuple[LibraryClip | Problem, tuple[Problem, ...]]
 
 
 @dataclass(frozen=True)
@@ -117,6 +131,7 @@ def build_library(
     tasks: list[_Task] = []
     clips: list[LibraryClip] = []
     left: list[Problem] = []
+    problems: list[Problem] = []
     used: set[str] = set()
     contents = [file_hash(path) for path in files]
     before = _Before.of(previous, contents)
@@ -135,21 +150,29 @@ def build_library(
             continue
         old = replace(old, name=name, path=relative, label=label, actor=actor)
         clips.append(old if cut_as == cutting else _cut_again(old, cutting))
-    unchanged = len(clips)
+    kept_clips, read = len(clips), {task.name for task in tasks}
     results = _run(tasks, jobs)
     next_time = time.monotonic() + keep
     try:
-        for done in each(results, len(tasks), progress):
-            (clips if isinstance(done, LibraryClip) else left).append(done)
+        for done, odd in each(results, len(tasks), progress):
+            (clips if isinstance(done, LibraryClip) else left).append(done)  # type: ignore[arg-type]
+            problems += odd
             if time.monotonic() > next_time:
                 # A tenth of the time at most: the larger the library, the rarer.
-                next_time += max(keep, 10.0 * _keep(clips[unchanged:], cutting, kept))
+                next_time += max(keep, 10.0 * _keep(clips[kept_clips:], cutting, kept))
     except BaseException:
-        _keep(clips[unchanged:], cutting, kept)
+        _keep(clips[kept_clips:], cutting, kept)
         raise
     if not clips:
         reasons = "; ".join(f"{entry.file}: {entry.message}" for entry in left[:3])
         raise InputError(f"No clip can be used for a library. {reasons}")
+    doubtful = [clip for clip in clips if clip.doubt]
+    if doubtful and len(doubtful) < len(clips):
+        clips = [clip for clip in clips if not clip.doubt]
+        left += [Problem("left-out", _no_mixing(clip), file=clip.path) for clip in doubtful]
+    else:
+        problems += [Problem("doubtful-units", clip.doubt, file=clip.path) for clip in doubtful]
+    unchanged = sum(clip.name not in read for clip in clips)
     ordered = tuple(sorted(clips, key=lambda c: c.name))
     library = MotionLibrary(ordered, cutting, tuple(sorted(left, key=lambda entry: entry.file)))
     unmatched = tuple(file for file in labels or {} if file not in used)
@@ -159,7 +182,16 @@ def build_library(
         for clip in (previous.clips if previous else ())
         if clip.content_hash not in here and clip.path not in here
     )
-    return BuildResult(library, len(ordered) - unchanged, unchanged, unmatched, removed)
+    counts = len(ordered) - unchanged, unchanged
+    return BuildResult(library, *counts, unmatched, removed, tuple(problems))
+
+
+def _no_mixing(clip: LibraryClip) -> str:
+    """Why a clip is not put beside others."""
+    return (
+        f"its unit of length is doubtful, and other clips' are not: {clip.doubt} with "
+        "'usdhand convert' and add the result"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,13 +298,13 @@ def label_of(stem: str) -> str:
     return found.group(1) if found else ""
 
 
-def _run(tasks: Sequence[_Task], jobs: int) -> Iterator[LibraryClip | Problem]:
+def _run(tasks: Sequence[_Task], jobs: int) -> Iterator[_Read]:
     if jobs < 1:
         yield from map(_read, tasks)
         return
     with closing(each_apart(_read, tasks, jobs)) as results:
         for task, found in results:
-            yield _left_out(task, found) if isinstance(found, UsdHandError) else found
+            yield (_left_out(task, found), ()) if isinstance(found, UsdHandError) else found
 
 
 def _left_out(task: _Task, error: UsdHandError) -> Problem:
@@ -281,14 +313,15 @@ def _left_out(task: _Task, error: UsdHandError) -> Problem:
     return Problem("left-out", reason, file=task.relative)
 
 
-def _read(task: _Task) -> LibraryClip | Problem:
+def _read(task: _Task) -> _Read:
     try:
         clip = read_clip(task.path)
         if len(clip) < 2:
-            return Problem("left-out", "it is a single frame", file=task.relative)
+            return Problem("left-out", "it is a single frame", file=task.relative), ()
+        hands = find_hands(clip, task.conventions)
         made = library_clip(
             clip,
-            find_hands(clip, task.conventions),
+            hands,
             task.segmentation,
             path=task.relative,
             content_hash=task.content_hash,
@@ -296,20 +329,32 @@ def _read(task: _Task) -> LibraryClip | Problem:
             actor=task.actor,
         )
         if not made.hands:
-            return Problem("left-out", "its fingers do not move", file=task.relative)
-        return replace(made, name=task.name)
+            return Problem("left-out", "its fingers do not move", file=task.relative), ()
+        return replace(made, name=task.name), (*_oddities(task, clip, hands, made),)
     except UsdHandError as error:
         if is_library(task.path):
-            return Problem("left-out", "it is a motion library", file=task.relative)
-        return _left_out(task, error)
+            return Problem("left-out", "it is a motion library", file=task.relative), ()
+        return _left_out(task, error), ()
+
+
+def _oddities(task: _Task, clip: Clip, hands: Hands, made: LibraryClip) -> Iterator[Problem]:
+    """What a person should know of a clip that is used."""
+    for problem in misleading_names(clip, task.conventions):
+        yield replace(problem, file=task.relative)
+    still = [s for s, f in hands.frames.items() if moved_frames(clip, f) is None]
+    if still:
+        what = f"{' and '.join(still)} hand stays in the bind pose"
+        yield Problem("bind-pose", what, file=task.relative)
+    ends = [side for side, hand in made.hands.items() if hand.used is not None]
+    if ends:
+        what = f"{' and '.join(ends)} hand starts or ends in the bind pose"
+        yield Problem("bind-pose", what, file=task.relative)
 
 
 def _cut_again(clip: LibraryClip, segmentation: Segmentation) -> LibraryClip:
     """Return a clip with other segments; its motion need not be read again."""
-    from usdhand.fill.candidates import part_segments
-
     hands = {
-        side: replace(hand, segments=tuple(part_segments([hand.arm], segmentation)))
+        side: replace(hand, segments=hand_segments([hand], segmentation))
         for side, hand in clip.hands.items()
     }
     return replace(clip, hands=hands)

@@ -6,7 +6,7 @@ import csv
 import io
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -25,7 +25,7 @@ from usdhand.formats.output import check_outputs
 from usdhand.formats.paths import written_files
 from usdhand.formats.usd.library import is_library, read_library, write_library
 from usdhand.inputs import read_text
-from usdhand.problems import counted, listed
+from usdhand.problems import Problem, counted, listed
 from usdhand.report.library import library_result, summary
 from usdhand.requests.library import LibraryBuildRequest
 from usdhand.verbs.clips import conventions_of, rig_files
@@ -105,12 +105,24 @@ def _tell(
         own = entry.message.startswith(entry.file)  # the message names it
         named = entry.message if own else f"{entry.file}: {entry.message}"
         journal.warn("left-out", f"left out: {named}", entry.file)
+    journal.about(request.output, (p for p in built.problems if p.code != "bind-pose"), "warning")
+    for what, files in _by_message(p for p in built.problems if p.code == "bind-pose"):
+        message = f"{counted(len(files), 'clip')}: the {what}, which is left out: {listed(files)}"
+        journal.warn("bind-pose", message)
     if built.removed:
         journal.warn("removed", _what_is_removed(built.removed))
     if built.unmatched:
         some = listed(built.unmatched)
         message = f"{len(built.unmatched)} rows match no clip: {some}"
         journal.warn("labels-without-clip", message, request.labels or "")
+
+
+def _by_message(problems: Iterable[Problem]) -> list[tuple[str, list[str]]]:
+    """Messages with the files that they are of."""
+    found: dict[str, list[str]] = {}
+    for problem in problems:
+        found.setdefault(problem.message, []).append(problem.file)
+    return sorted(found.items())
 
 
 def _previous(request: LibraryBuildRequest, journal: Journal) -> MotionLibrary | None:

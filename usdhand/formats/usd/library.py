@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from pxr import Kind, Sdf, Tf, Usd, Vt
+from pxr import Gf, Kind, Sdf, Tf, Usd, Vt
 
 from usdhand.anatomy import HAND_JOINTS, SIDES, Side
 from usdhand.errors import InputError, UsageError, UsdHandError
@@ -233,6 +233,10 @@ def _write_clip(layer: Sdf.Layer, clip: LibraryClip, name: str) -> None:
                 f"{side}:fingers": (_TYPES.FloatArray, _floats(hand.fingers)),
             },
         )
+        if hand.used is not None:
+            _set_all(prim, {f"{side}:used": (_TYPES.Int2, Gf.Vec2i(*hand.used))})
+    if clip.doubt:
+        _set_all(prim, {"doubt": (_TYPES.String, clip.doubt)})
 
 
 def _read_clip(prim: Usd.Prim) -> LibraryClip:
@@ -259,7 +263,7 @@ def _read_clip(prim: Usd.Prim) -> LibraryClip:
     name, content, file = str(need("name")), str(need("contentHash")), need("file")
     try:
         hands = {
-            side: _read_hand(side, need)
+            side: _read_hand(side, need, _get(prim, f"{side}:used"))
             for side in SIDES
             if _get(prim, f"{side}:joints") is not None
         }
@@ -281,10 +285,11 @@ def _read_clip(prim: Usd.Prim) -> LibraryClip:
         content,
         cast(Mapping[Side, LibraryHand], hands),
         shapes,
+        str(_get(prim, "doubt", "")),
     )
 
 
-def _read_hand(side: Side, need: Callable[[str], Any]) -> LibraryHand:
+def _read_hand(side: Side, need: Callable[[str], Any], used: Any) -> LibraryHand:
     joints = tuple(str(j) for j in need(f"{side}:joints"))
     arm = np.array(need(f"{side}:arm"), dtype=np.float64)
     fingers = np.array(need(f"{side}:fingers"), dtype=np.float64)
@@ -302,11 +307,16 @@ def _read_hand(side: Side, need: Callable[[str], Any]) -> LibraryHand:
     inside = (segments >= 0) & (segments < len(arm))
     if not inside.all() or (segments[:, 0] >= segments[:, 1]).any():
         raise _DamagedError(f"its {side} segments are outside the motion")
+    if used is not None:
+        used = int(used[0]), int(used[1])
+        if not 0 <= used[0] <= used[1] < len(arm):
+            raise _DamagedError(f"its {side} frames of use are outside the motion")
     return LibraryHand(
         unpack_arm(arm),
         joints,
         fingers.reshape(-1, width),
         tuple((int(a), int(b)) for a, b in segments),
+        used,
     )
 
 
