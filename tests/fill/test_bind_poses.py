@@ -71,6 +71,22 @@ def test_fingers_turned_by_less_than_a_few_degrees_are_in_the_bind_pose() -> Non
         assert found.all() if expected else not found.any()
 
 
+def test_bind_poses_at_the_ends_do_not_count_as_errors() -> None:
+    clip = followed_by(still_clip(3.0), long_clip(10.0), still_clip(2.0))
+    takes = [replace(long_clip(20.0, seed=i), name=f"take{i}") for i in (1, 2)]
+    library = usdhand.MotionLibrary(tuple(kept(take) for take in takes))
+    errors, _ = usdhand.measure_library(library, ".", takes=[clip])
+    frames = usdhand.find_hands(clip).frames
+    for error in errors:
+        first, last = moved_frames(clip, frames[error.side]) or (0, 0)
+        assert error.frames == last - first + 1 < len(clip)
+    rest = [error.degrees for error in errors if error.method == "rest pose"]
+    encoded = usdhand.find_hands(clip).encode(clip).values
+    assert len(rest) == 2
+    assert min(rest) > 1.0
+    assert np.abs(encoded[0] - encoded[-1]).max() < 1e-6
+
+
 def test_a_build_says_which_hands_are_in_the_bind_pose(tmp_path: Path) -> None:
     ends = followed_by(still_clip(2.0), long_clip(6.0), still_clip(1.0))
     for name, clip in (("ends", ends), ("left", in_bind(long_clip(6.0), "left"))):

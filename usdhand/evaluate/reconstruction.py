@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from usdhand.anatomy import SIDES, Channels, Hands, Side, fingertips
+from usdhand.anatomy.at_bind import moved_frames
 from usdhand.anatomy.channels import all_channels, joint_rotations
 from usdhand.display import displayed
 from usdhand.fill.assemble import Piece, join
@@ -31,6 +32,7 @@ METHODS = ("fill", "nearest", "random", "mean pose", "rest pose", "best candidat
 class HandError:
     """Error of one hand of one take: means over frames, joints and digits.
 
+    The bind poses that a take starts and ends with do not count: they are no motion of a hand.
     ``degrees`` is the angle between true and filled joint rotation, ``fingertip_mm`` the distance
     of the fingertips in the axes of the palm, ``jerk`` the RMS third derivative in degrees / s^3.
     """
@@ -133,15 +135,17 @@ def _error(
     true, made = (np.stack(joint_rotations(c, frames), axis=1)[:, joints].T for c in (clip, other))
     angle = rot.angle_between(true, made)
     apart = fingertips(other, hand, frames) - fingertips(clip, hand, frames)
-    jerk = np.diff(curves, n=3, axis=0) * clip.fps**3
+    first, last = moved_frames(clip, frames) or (0, len(clip) - 1)
+    counted = slice(first, last + 1)
+    jerk = np.diff(curves[counted], n=3, axis=0) * clip.fps**3
     return HandError(
         clip.name,
         side,
         method,
-        float(angle.mean()),
-        float(10.0 * np.linalg.norm(apart, axis=-1).mean()),
+        float(angle[counted].mean()),
+        float(10.0 * np.linalg.norm(apart[counted], axis=-1).mean()),
         float(np.sqrt(np.mean(jerk**2))) if len(jerk) else 0.0,
-        len(clip),
+        last + 1 - first,
     )
 
 
