@@ -19,6 +19,7 @@ import usdhand
 from usdhand.anatomy import SIDES
 from usdhand.anatomy.hand import digit_joints
 from usdhand.formats.usd.names import legal_name
+from usdhand.motion import rotations as rot
 
 BODIES = (
     "humanik", "mixamo", "unreal", "rigify", "unity_humanoid", "unity_spaced", "vroid", "smplx",
@@ -97,6 +98,24 @@ def test_a_whole_digit_stays_or_is_replaced(
     assert "stays beside the added" in whole.stderr
     hands = usdhand.find_hands(usdhand.read_clip(tmp_path / "whole.usdc"))
     assert {side: len(f.names) for side, f in hands.frames.items()} == {"left": 15, "right": 15}
+
+
+def test_a_whole_digit_that_moves_gets_the_motion(library: Path, tmp_path: Path) -> None:
+    names = known_rigs()["humanik"]
+    clip = named_body(names, digits=["Index"])
+    rotations = clip.rotations.copy()
+    joints = [j for j, name in enumerate(clip.skeleton.names) if name.endswith("HandIndex2")]
+    bend = rot.from_axis_angle(np.array([0.0, 0.0, 1.0]), 0.5 * np.sin(np.arange(len(clip)) / 5.0))
+    for joint in joints:
+        rotations[:, joint] = rot.multiply(rotations[:, joint], bend)
+    usdhand.write_clip(clip.with_rotations(rotations), tmp_path / "body.usdc")
+    out = tmp_path / "out.usdc"
+    text = run("fill", tmp_path / "body.usdc", "--library", library, "-o", out, "--add-fingers")
+    assert "stays its index and gets the motion" in text.output
+    assert len(joints) == 2
+    filled = usdhand.read_clip(out)
+    for joint in joints:
+        assert np.abs(filled.rotations[:, joint] - rotations[:, joint]).max() > 0.01
 
 
 def test_replacing_fingers_needs_some_to_add(library: Path, tmp_path: Path) -> None:

@@ -161,7 +161,8 @@ def run(request: FillRequest, journal: Journal) -> Outcome:
         library,
         request.settings,
         sides=wanted,
-        replace_motion=request.replace,
+        # A digit that a body without hands has may move: it gets the motion of its new hand.
+        replace_motion=request.replace or (added is not None and set(added.joints) >= set(wanted)),
         conventions=conventions,
         progress=journal.progress("filling"),
     )

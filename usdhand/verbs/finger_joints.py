@@ -163,12 +163,13 @@ def add_fingers(
         names = [name for chain in digits.values() for name in chain]
         what = " and ".join(digit.lower() for digit in digits)
         message = (
-            f"{hand} hand: {listed(names)} stays its {what}; --replace-fingers adds a new {what}"
+            f"{hand} hand: {listed(names)} stays its {what} and gets the motion; "
+            f"--replace-fingers adds a new {what}"
         )
         journal.warn("kept-fingers", message)
     for hand, stubs in finger_stubs(clip, conventions, bare).items():
-        own = {name for chain in kept.get(hand, {}).values() for name in chain}
-        stubs = [name for name in stubs if name not in own]
+        own = [name for chain in kept.get(hand, {}).values() for name in chain]
+        stubs = [name for name in stubs if not name.startswith(tuple(own))]
         if stubs:
             what = "thumb" if all("thumb" in name.lower() for name in stubs) else "fingers"
             message = f"{hand} hand: {listed(stubs)} stays beside the added {what}"
