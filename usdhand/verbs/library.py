@@ -155,7 +155,7 @@ def build_library(
     next_time = time.monotonic() + keep
     try:
         for done, odd in each(results, len(tasks), progress):
-            (clips if isinstance(done, LibraryClip) else left).append(done)  # type: ignore[arg-type]
+            (clips if isinstance(done, LibraryClip) else left).append(done)
             problems += odd
             if time.monotonic() > next_time:
                 # A tenth of the time at most: the larger the library, the rarer.
