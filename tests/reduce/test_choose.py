@@ -189,6 +189,27 @@ def test_moving_one_hand_leaves_the_other(controllers: int | None) -> None:
         assert {name[:2] for name in relation.controllers} <= {relation.name[:2]}
 
 
+def test_takes_count_by_time_whatever_their_rates() -> None:
+    """A take with every frame four times, at four times the rate, is the same motion."""
+    clip, hands, source = TAKES[1]
+    often = np.repeat(np.arange(len(clip)), 4)
+    fast = replace(
+        clip,
+        rotations=clip.rotations[often],
+        translations=clip.translations[often],
+        scales=clip.scales[often],
+        fps=4.0 * clip.fps,
+    )
+    same = Channels(source.names, source.values[often])
+    one = gather([TAKES[0], TAKES[1], TAKES[2]])
+    other = gather([TAKES[0], (fast, hands, same), TAKES[2]])
+    assert_allclose(other.moments.covariance, one.moments.covariance, rtol=1e-6, atol=1e-9)
+    assert_allclose(other.moments.mean, one.moments.mean, atol=1e-9)
+    assert list(other.held.values()) == pytest.approx(list(one.held.values()))
+    asked = Target(free_channels=9)
+    assert fit_to(other, asked, "least-squares").free == fit_to(one, asked, "least-squares").free
+
+
 def test_whole_turns_between_takes_are_taken_off() -> None:
     clip, hands, source = TAKES[0]
     values = source.values.copy()

@@ -87,7 +87,7 @@ def error_curve(
     shape = Shape(controllers, RIDGE if len(folds) >= FEWEST_FOLDS else Shape().ridge)
     fitted = _losses(evidence, evidence.moments, [evidence.moments], shape, choice)
     unseen: dict[int, list[tuple[Loss, Loss]]] = {}
-    weights = np.array([fold.frames for fold in folds]) / evidence.moments.frames
+    weights = np.array([fold.seconds for fold in folds]) / evidence.moments.seconds
     if len(folds) > 1:
         for i, fold in enumerate(folds):
             others = pooled(f for j, f in enumerate(folds) if j != i)

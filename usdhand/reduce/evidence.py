@@ -82,7 +82,7 @@ def gather(takes: Iterable[tuple[Clip, Hands, Channels]]) -> Takes:
     folds: list[Moments] = []
     names: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
-    frames = 0
+    seconds = 0.0
     sources: list[str] = []
     tips = bands = means = np.zeros(())
     for number, (clip, hands, source) in enumerate(takes):
@@ -98,13 +98,13 @@ def gather(takes: Iterable[tuple[Clip, Hands, Channels]]) -> Takes:
             )
         held = held or tuple(n for n in source.names if n not in set(names))
         curves = source.select(names).values
-        own, outside = Moments.of(curves), source.select(held).values.mean(axis=0)
+        own, outside = Moments.of(curves, clip.fps), source.select(held).values.mean(axis=0)
         if folds:
             own = own.turned(whole_turns(names, own.mean - pooled(folds).mean))
-        share = len(clip) / (frames + len(clip))
+        share = own.seconds / (seconds + own.seconds)
         tips = (1.0 - share) * tips + share * tip_forms(clip, hands, source)
         bands = (1.0 - share) * bands + share * band_covariances(curves, clip.fps)
-        frames += len(clip)
+        seconds += own.seconds
         means = (1.0 - share) * means + share * outside
         if number < MOST_FOLDS:
             folds.append(own)

@@ -17,23 +17,26 @@ class Moments:
     Attributes
     ----------
     frames : how many
+    seconds : how long; takes count by time, whatever their rates
     mean, low, high : (n,)
     covariance : (n, n) over the population (``ddof=0``)
     """
 
     frames: int
+    seconds: float
     mean: Array
     covariance: Array
     low: Array
     high: Array
 
     @classmethod
-    def of(cls, curves: Array) -> Moments:
+    def of(cls, curves: Array, fps: float = 1.0) -> Moments:
         """Moments of curves (frames, n), at least one frame."""
         mean = curves.mean(axis=0)
         centred = curves - mean
         return cls(
             len(curves),
+            len(curves) / fps,
             mean,
             np.asarray(centred.T @ centred / len(curves)),
             curves.min(axis=0),
@@ -57,11 +60,12 @@ class Moments:
 
     def plus(self, other: Moments) -> Moments:
         """Moments of the frames of both."""
-        frames = self.frames + other.frames
-        share = other.frames / frames
+        seconds = self.seconds + other.seconds
+        share = other.seconds / seconds
         away = other.mean - self.mean
         return Moments(
-            frames,
+            self.frames + other.frames,
+            seconds,
             self.mean + share * away,
             (1.0 - share) * self.covariance
             + share * other.covariance

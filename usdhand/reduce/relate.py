@@ -86,12 +86,12 @@ def left_out(
     ----------
     related : (n, n) 1 where a channel may follow another, else 0
     """
-    frames = sum(fold.frames for fold in folds)
+    seconds = sum(fold.seconds for fold in folds)
     total = np.zeros((len(folds[0].mean),) * 2)
     for i, fold in enumerate(folds):
         others = pooled(f for j, f in enumerate(folds) if j != i)
         missed = residual_moments(told_by(related * others.covariance, free, shape), others, fold)
-        total += fold.frames / frames * missed
+        total += fold.seconds / seconds * missed
     return total
 
 

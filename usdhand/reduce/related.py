@@ -43,5 +43,5 @@ def _errors(folds: Sequence[Moments], related: Array) -> Array:
         for k, count in enumerate(COUNTS):
             chosen = search.grown(chosen, min(count, len(covariance)))
             told = told_by(covariance, search.channels(chosen), shape)
-            total[k] += fold.frames * np.trace(residual_moments(told, others, fold))
+            total[k] += fold.seconds * np.trace(residual_moments(told, others, fold))
     return total

@@ -57,14 +57,23 @@ def add_best(panel: Axes, curve: ErrorCurve, unit: str) -> None:
         ("pca_left_out", ":", GREY, "PCA, on takes left out"),
     )
     for name, line, colour, label in parts:
-        counts, errors = _known(curve.points, name, unit)
-        if counts:
-            panel.plot(counts, errors, line, color=colour, label=label)
-    for number, (preset, (count, loss)) in enumerate(curve.presets.items()):
+        known, errors = _known(curve.points, name, unit)
+        if known:
+            panel.plot(known, errors, line, color=colour, label=label)
+    places: dict[tuple[int, float], list[str]] = {}
+    for preset, (count, loss) in curve.presets.items():
+        places.setdefault((count, round(loss.by(unit), 2)), []).append(str(preset))
+    for number, (place, presets) in enumerate(places.items()):
         label = "presets 1 to 4" if number == 0 else "_"
-        panel.plot([count], [loss.by(unit)], "s", color=BLACK, markersize=4, label=label)
+        panel.plot(*([x] for x in place), "s", color=BLACK, markersize=4, label=label)
+        text, right = ", ".join(presets), place[0] > 0.9 * curve.points[-1].channels
         panel.annotate(
-            str(preset), (count, loss.by(unit)), (3, 3), textcoords="offset points", fontsize=7
+            text,
+            place,
+            (-3 if right else 3, 3),
+            textcoords="offset points",
+            fontsize=7,
+            ha="right" if right else "left",
         )
     panel.axvline(
         curve.suggested, color=LIGHT, label=f"suggested number: {curve.suggested}", zorder=0
