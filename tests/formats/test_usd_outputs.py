@@ -15,7 +15,7 @@ from conftest import REPOSITORY
 from pxr import Usd, UsdSkel
 
 from usdhand.errors import OutputError
-from usdhand.formats.usd import write
+from usdhand.formats.usd import saving, write
 from usdhand.formats.usd.read import clip_from_character, read_clip
 from usdhand.formats.usd.stage import find_character
 from usdhand.formats.usd.write import write_motion
@@ -128,11 +128,16 @@ def test_a_read_only_folder(tmp_path: Path) -> None:
 
 
 FAILURES: dict[str, Callable[[pytest.MonkeyPatch], None]] = {
-    "export": lambda m: m.setattr(write, "_export", _raise(OutputError("USD cannot write there"))),
+    "export": lambda m: _set(m, "export", OutputError("USD cannot write there")),
     "replace": lambda m: m.setattr(os, "replace", _raise(OSError(28, "No space left on device"))),
-    "verify": lambda m: m.setattr(write, "open_stage", _raise(OutputError("cannot be read back"))),
-    "interrupt": lambda m: m.setattr(write, "_verify", _raise(KeyboardInterrupt())),
+    "verify": lambda m: m.setattr(saving, "open_stage", _raise(OutputError("cannot be read back"))),
+    "interrupt": lambda m: _set(m, "verify", KeyboardInterrupt()),
 }
+
+
+def _set(patch: pytest.MonkeyPatch, name: str, error: BaseException) -> None:
+    for module in (saving, write):
+        patch.setattr(module, name, _raise(error))
 
 
 def _raise(error: BaseException) -> Callable[..., None]:
