@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from usdhand.errors import InputError
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Y_UP_FROM_Z_UP, Array
 
@@ -113,10 +114,21 @@ def local_matrices(world: Array, parents: NDArray[np.intp], above: Array | None 
     ----------
     parents : (joints,) -1 for roots
     above : (4, 4) what roots hang off; the world itself if None
+
+    Raises
+    ------
+    InputError
+        if what hangs off a joint has no place in it, since its size is 0.
     """
     hangs = (parents >= 0)[:, None, None]
     holders = np.where(hangs, world[parents], np.eye(4) if above is None else above)
-    return np.asarray(np.linalg.inv(holders) @ world)
+    try:
+        return np.asarray(np.linalg.inv(holders) @ world)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "A joint with joints below it has a transform without an inverse: its size is 0 along "
+            "an axis. Give it a size."
+        ) from error
 
 
 def with_even_signs(rotations: Array, scales: Array) -> tuple[Array, Array]:
