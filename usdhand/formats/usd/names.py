@@ -53,12 +53,9 @@ def order_problems(joints: Sequence[str], where: str) -> Iterator[Problem]:
     parents = parents_from_paths(joints)
     late = [joints[int(j)] for j in np.flatnonzero(parents > np.arange(len(joints)))]
     if late:
-        those = counted(
-            len(late), "joint is listed before its parent", "joints are listed before their parents"
-        )
         message = (
-            f"{those}, so UsdSkel refuses the skeleton: {listed(late)}. 'usdhand convert' puts "
-            "them in order"
+            "joints are listed before their parents, so UsdSkel refuses the skeleton: "
+            f"{listed(late)}. 'usdhand convert' puts them in order"
         )
         yield Problem("joint-order", message, where)
 
