@@ -23,7 +23,7 @@ from usdhand.formats.files import read_any
 from usdhand.motion import Clip, Skeleton, forward_kinematics
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import Array
-from usdhand.splice.merge import with_wrist
+from usdhand.splice.merge import with_wrist, wrist_along
 from usdhand.verbs.convert import retarget_hands, write_new
 
 SAMPLES = REPOSITORY / "samples"
@@ -274,7 +274,8 @@ def test_a_wrist_without_a_forearm_is_not_spliced() -> None:
     warp = np.arange(FRAMES) / clip.fps
     for body, other in ((roots, clip), (clip, roots)):
         with pytest.raises(UsageError, match=r"left wrist.*no forearm"):
-            with_wrist(body, other, hands_of(body), hands_of(other), "left", warp)
+            bends = wrist_along(other, hands_of(other), "left", warp)
+            with_wrist(body, hands_of(body), "left", bends)
 
 
 def turned_since_the_start(clip: Clip, hand: HandMap) -> dict[str, Array]:
