@@ -175,13 +175,16 @@ def check_values(value: Any) -> None:
 
 
 def _is_of(kind: Any, value: Any) -> bool:
-    """Whether a value is of a simple type, or a tuple of such; numbers may be numpy's."""
+    """Whether a value is of a simple type, or a tuple of such."""
     if inner := get_args(kind):
-        return (
-            isinstance(value, Sequence)
-            and len(value) == len(inner)
-            and all(_is_of(one, part) for one, part in zip(inner, value, strict=True))
-        )
+        if not isinstance(value, Sequence) or len(value) != len(inner):
+            return False
+        return all(_is_simply(one, part) for one, part in zip(inner, value, strict=True))
+    return _is_simply(kind, value)
+
+
+def _is_simply(kind: Any, value: Any) -> bool:
+    """Whether a value is of a simple type; numbers may be numpy's."""
     if isinstance(value, bool) or kind in (bool, str, Path):
         return isinstance(value, kind) and (kind is bool) == isinstance(value, bool)
     return isinstance(value, Real if kind is float else Integral)

@@ -274,8 +274,13 @@ def test_a_wrist_without_a_forearm_is_not_spliced() -> None:
     warp = np.arange(FRAMES) / clip.fps
     for body, other in ((roots, clip), (clip, roots)):
         with pytest.raises(UsageError, match=r"left wrist.*no forearm"):
-            bends = wrist_along(other, hands_of(other), "left", warp)
-            with_wrist(body, hands_of(body), "left", bends)
+            spliced_wrist(body, other, warp)
+
+
+def spliced_wrist(body: Clip, other: Clip, warp: Array) -> Clip:
+    return with_wrist(
+        body, hands_of(body), "left", wrist_along(other, hands_of(other), "left", warp)
+    )
 
 
 def turned_since_the_start(clip: Clip, hand: HandMap) -> dict[str, Array]:

@@ -56,7 +56,7 @@ def test_an_interruption_is_no_traceback(monkeypatch: pytest.MonkeyPatch) -> Non
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("usdhand.verbs.run.run", interrupted)
+    monkeypatch.setattr("usdhand.verbs.run.run_verb", interrupted)
     result = CliRunner().invoke(main, ["inspect", str(OK)])
     assert result.exit_code == 130
     assert "Interrupted" in result.output

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.clips import frames_of
 from builders.cost import processor_seconds
 from builders.long_clips import followed_by, long_clip, still_clip
 from hypothesis import given, settings
@@ -145,7 +146,8 @@ def test_cuts_of_a_hold_are_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
 
     nearest_search = nearest.nearest
     monkeypatch.setattr(nearest, "nearest", counted)
-    gestures, hold = long_clip(60, fps=15.0, seed=1), still_clip(60, fps=15.0)
+    gestures = long_clip(60, fps=15.0, seed=1)
+    hold = frames_of(gestures, np.full(900, 40))
     library = library_of(replace(followed_by(gestures, hold), name="held"))
     body = followed_by(long_clip(60, fps=15.0, seed=2), hold)
     choices = filled(body, library).parts[0].alternatives[0].choices

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from oracles import fill_2012 as oracle
 
-from usdhand.fill.assemble import Piece, join, within_limits
+from usdhand.fill.assemble import FingerPiece, join, within_limits
 from usdhand.fill.path import alternative_paths, best_path, path_cost, transition_cost
 from usdhand.fill.segment import segments
 from usdhand.fill.settings import Segmentation
@@ -111,7 +111,7 @@ def test_joining_by_the_papers_rule(seed: int, count: int, size: float) -> None:
     curves = [random.normal(size=(int(random.integers(2, 8)), 3)) * size for _ in range(count)]
     pieces, first = [], 0
     for own in curves:
-        pieces.append(Piece(first, first + len(own) - 1, own))
+        pieces.append(FingerPiece(first, first + len(own) - 1, own))
         first += len(own) - 1
     assert_allclose(join(pieces, "linear"), oracle.joined(curves), atol=1e-9)
 
@@ -120,7 +120,7 @@ def test_joining_by_the_papers_rule(seed: int, count: int, size: float) -> None:
 def test_smooth_joining_meets_halfway(seed: int, count: int) -> None:
     random = np.random.default_rng(seed)
     curves = np.cumsum(random.normal(size=(count, 40, 3)), axis=1)
-    pieces = [Piece(39 * i, 39 * (i + 1), own) for i, own in enumerate(curves)]
+    pieces = [FingerPiece(39 * i, 39 * (i + 1), own) for i, own in enumerate(curves)]
     result = join(pieces, "smooth")
     assert_allclose(result[[0, -1]], [curves[0, 0], curves[-1, -1]], atol=1e-9)
     for piece, before in zip(pieces[1:], curves[:-1], strict=True):
@@ -140,7 +140,7 @@ def test_joining_knows_no_direction_of_time(seed: int, count: int) -> None:
     def joined(parts: list[Array]) -> Array:
         pieces, first = [], 0
         for own in parts:
-            pieces.append(Piece(first, first + len(own) - 1, own))
+            pieces.append(FingerPiece(first, first + len(own) - 1, own))
             first += len(own) - 1
         return join(pieces)
 

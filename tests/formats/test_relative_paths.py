@@ -38,7 +38,7 @@ def linked(folder: Path, link: str, to: str) -> tuple[Path, Path]:
 
 def sublayer(path: Path) -> str:
     layer = Sdf.Layer.FindOrOpen(str(path))
-    [found] = layer.subLayerPaths
+    [found] = [path for path in layer.subLayerPaths if not path.endswith(".motion.usdc")]
     return found
 
 

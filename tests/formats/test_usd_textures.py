@@ -12,7 +12,7 @@ from builders.cli_runner import run
 from pxr import Sdf, Usd, UsdShade, UsdUtils
 
 from usdhand.errors import OutputError
-from usdhand.formats.usd import write
+from usdhand.formats.usd import saving, write
 from usdhand.formats.usd.check import check_file
 
 TILES = ("1001", "1002")
@@ -102,10 +102,18 @@ def test_textures_go_along(
         assert pictures(textured) == ALL
     beside = sorted(p.name for p in (tmp_path / "out").rglob("*"))
     if (source, suffix) == ("packed", "usda"):
-        own = ["2_p.png", "new.usda", "new_textures", "p.png", "u.1001.png", "u.1002.png"]
+        own = [
+            "2_p.png",
+            "new.motion.usdc",
+            "new.usda",
+            "new_textures",
+            "p.png",
+            "u.1001.png",
+            "u.1002.png",
+        ]
         assert beside == own
     else:
-        assert len(beside) == (suffix == "usda")
+        assert len(beside) == 2 * (suffix == "usda")  # with the motion
 
 
 def test_where_textures_of_a_package_are_is_said(packed: Path, tmp_path: Path) -> None:
@@ -126,7 +134,7 @@ def test_files_beside_are_never_replaced(packed: Path, tmp_path: Path) -> None:
     assert pictures(target) == ALL
     run("convert", packed, "-o", target, "--force")  # the same files again need no third folder
     assert sorted(p.name for p in tmp_path.glob("new*")) == [
-        *("new.usda", "new_textures", "new_textures2")
+        *("new.motion.usdc", "new.usda", "new_textures", "new_textures2")
     ]
 
 
@@ -138,7 +146,7 @@ def test_a_failure_takes_textures_back(
         raise OSError(28, "No space left on device")
 
     before = sorted(tmp_path.rglob("*"))
-    monkeypatch.setattr(*((os, "replace") if failure == "replace" else (write, "_verify")), fail)
+    monkeypatch.setattr(*((os, "replace") if failure == "replace" else (saving, "verify")), fail)
     layer = Sdf.Layer.CreateAnonymous()
     layer.subLayerPaths.append(str(packed))
     with pytest.raises(OutputError, match="No space left"):

@@ -24,7 +24,7 @@ BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
 def test_an_outcome_says_what_was_written_and_reports_when_asked(tmp_path: Path) -> None:
     out = tmp_path / "rig.usda"
     outcome = run(ReduceRequest(clips=(str(OK),), output=out))
-    assert outcome.written == (out,)
+    assert outcome.written == (out, tmp_path / "rig.motion.usdc")
     assert out.exists()
     assert outcome.exit_code == 0
     assert "result" not in vars(outcome), "nobody asked for the report yet"
@@ -49,7 +49,8 @@ def test_a_bad_file_of_several_is_a_problem_with_its_file(tmp_path: Path) -> Non
     outcome = run(request, listener=heard.append)
     assert outcome.exit_code == 3
     assert [p.severity for p in heard] == ["error", "error"]
-    assert list(outcome.problems) == heard
+    assert [p for p in outcome.problems if p.severity == "error"] == heard
+    assert [p.file for p in heard] == [str(bad), str(tmp_path / "none.usd")]
     assert {p.code for p in heard} == {"input"}
     assert ["error" in f for f in outcome.result["files"]] == [False, True, True]
 
@@ -64,7 +65,7 @@ def test_whoever_watches_may_stop(tmp_path: Path) -> None:
     clips = (str(SAMPLES / "gestures"),)
     with pytest.raises(CancelledError, match="Stopped after 2 of 64"):
         run(LibraryBuildRequest(clips=clips, output=tmp_path / "l.usdc"), watch=watch)
-    assert steps == [("reading", i, 64) for i in range(3)]
+    assert steps == [("library build", 0, 1), *(("reading", i, 64) for i in range(3))]
     assert not (tmp_path / "l.usdc").exists()
     again = run(LibraryBuildRequest(clips=clips, output=tmp_path / "l.usdc"))
     assert again.result["read"] == 62, "what was read before is kept"

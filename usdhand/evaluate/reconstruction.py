@@ -12,7 +12,7 @@ from usdhand.anatomy import SIDES, Channels, Hands, Side, fingertips
 from usdhand.anatomy.at_bind import moved_frames
 from usdhand.anatomy.channels import all_channels, joint_rotations
 from usdhand.display import displayed
-from usdhand.fill.assemble import Piece, join
+from usdhand.fill.assemble import FingerPiece, join
 from usdhand.fill.candidates import Candidate, SearchSpace, finger_curves, finger_sources
 from usdhand.fill.library import MotionLibrary, Part
 from usdhand.fill.method import fill
@@ -98,7 +98,7 @@ def _hand_errors(
         options = finger_curves(
             _considered(choice), space, sources, np.arange(b - a + 1) / clip.fps
         )
-        nearest.append(Piece(a, b, options[0]))
+        nearest.append(FingerPiece(a, b, options[0]))
         wrong = np.abs(options[1:] - truth[a : b + 1]).mean(axis=(1, 2))
         best[a : b + 1] = options[1 + int(np.argmin(wrong))]
     others = [

@@ -24,7 +24,7 @@ LIMIT_REACH_S = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class FingerPiece:
     """A segment's finger curves in the body's time.
 
     Attributes
@@ -38,7 +38,7 @@ class Piece:
     curves: Array
 
 
-def join(pieces: Sequence[Piece], blend: Blend = "smooth") -> Array:
+def join(pieces: Sequence[FingerPiece], blend: Blend = "smooth") -> Array:
     """Curves (frames, channels) of consecutive pieces without jumps at the seams.
 
     With ``linear``, as in the paper, the difference at a seam is added to the new piece as an
@@ -54,7 +54,7 @@ def join(pieces: Sequence[Piece], blend: Blend = "smooth") -> Array:
     return result
 
 
-def _offset(pieces: Sequence[Piece]) -> list[Array]:
+def _offset(pieces: Sequence[FingerPiece]) -> list[Array]:
     """Pieces that begin where the one before ends."""
     joined = [pieces[0].curves]
     for piece in pieces[1:]:
@@ -63,7 +63,7 @@ def _offset(pieces: Sequence[Piece]) -> list[Array]:
     return joined
 
 
-def _halfway(pieces: Sequence[Piece]) -> list[Array]:
+def _halfway(pieces: Sequence[FingerPiece]) -> list[Array]:
     """Pieces that meet halfway, in angle and in speed."""
     joined = [piece.curves.copy() for piece in pieces]
     for i, (before, after) in enumerate(pairwise(pieces)):

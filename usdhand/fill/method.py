@@ -12,7 +12,7 @@ from usdhand.anatomy import SIDES, Channels, Hands, Side
 from usdhand.anatomy.channels import all_channels, fingers_move
 from usdhand.errors import InputError, UsageError
 from usdhand.fill.arm import ArmMotion, arm_motion, is_still
-from usdhand.fill.assemble import Piece, join, smooth_seams, within_limits
+from usdhand.fill.assemble import FingerPiece, join, smooth_seams, within_limits
 from usdhand.fill.candidates import (
     Candidate,
     FingerSource,
@@ -273,7 +273,7 @@ def _fill_part(
     alternatives = []
     for path in choose(network, settings):
         pieces = [
-            Piece(a, b, own[layer.order[node]])
+            FingerPiece(a, b, own[layer.order[node]])
             for (a, b), own, layer, node in zip(
                 borders, curves, network.layers, path.nodes, strict=True
             )

@@ -1,42 +1,37 @@
-"""Files that a file leads to: a result depends on them, too."""
+"""Layers that a file is composed of: a result depends on them, too."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from usdhand.formats.suffixes import USD_SUFFIXES
 
 
-def with_dependencies(paths: Iterable[Path]) -> list[Path]:
-    """Return files and the layers of which the USD ones among them are composed, each once.
+def open_layers_below(paths: Iterable[Path]) -> list[Path]:
+    """Return the files that USD files lead to by composition, as far as this process has them open.
 
-    Relative to the current folder where the file is.
+    Nothing is opened for it. Relative to the current folder where the file is.
     """
+    usd = [path for path in paths if path.suffix.lower() in USD_SUFFIXES]
+    if "pxr.Sdf" not in sys.modules or not usd:
+        return []
+    from pxr import Sdf
+
+    seen = {os.path.realpath(path) for path in usd}
     found: dict[Path, None] = {}
-    seen: set[str] = set()
-    for path in paths:
-        found[path] = None
-        seen.add(os.path.realpath(path))
-        if path.suffix.lower() in USD_SUFFIXES and path.is_file():
-            for layer in _layers(path):
-                if os.path.realpath(layer) not in seen:
-                    seen.add(os.path.realpath(layer))
-                    found[layer if path.is_absolute() else Path(os.path.relpath(layer))] = None
-    return list(found)
-
-
-def _layers(path: Path) -> Iterator[Path]:
-    from pxr import Tf, UsdUtils
-
-    from usdhand.formats.usd.damage import usd_diagnostics
-
-    try:
-        with usd_diagnostics():
-            layers, _, _ = UsdUtils.ComputeAllDependencies(str(path))
-    except Tf.ErrorException:  # what is wrong with them has been told where they were read
-        return
-    for layer in layers:
-        if layer.realPath and os.path.isfile(layer.realPath):  # noqa: PTH113  (none in packages)
-            yield Path(layer.realPath)
+    for path in usd:
+        waiting = [Sdf.Layer.Find(str(path.absolute())) or Sdf.Layer.Find(str(path))]
+        while waiting:
+            layer = waiting.pop()
+            for name in layer.GetCompositionAssetDependencies() if layer else ():
+                below = Sdf.Layer.FindRelativeToLayer(layer, name)
+                real = os.path.realpath(below.realPath) if below and below.realPath else ""
+                if real and real not in seen and Path(real).is_file():  # none is in a package
+                    seen.add(real)
+                    waiting.append(below)
+                    own = Path(below.realPath)
+                    found[own if path.is_absolute() else Path(os.path.relpath(own))] = None
+    return sorted(found)

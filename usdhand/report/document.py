@@ -31,10 +31,15 @@ def document(
         "schema": f"usdhand.{name or request.verb.split()[0]}/{SCHEMA_VERSION}",
         "usdhand": __version__,
         "request": to_data(request),
-        "inputs": [{"path": str(p), "sha256": file_hash(p)} for p in inputs],
+        "inputs": hashed(inputs),
         "settings": dict(settings),
         **result,
     }
+
+
+def hashed(paths: Sequence[Path]) -> list[dict[str, str | None]]:
+    """Files with the hash of their content, None for what is no file."""
+    return [{"path": str(path), "sha256": file_hash(path)} for path in paths]
 
 
 def dumps(value: Mapping[str, Any]) -> str:

@@ -30,7 +30,7 @@ def read_pins(path: Path) -> tuple[str, ...]:
         raise InputError(f"{path}: no JSON ({error}).") from error
     if not isinstance(edits, dict) or edits.get("schema") != SCHEMA:
         raise InputError(f'{path}: not a file of edits: it has no "schema": "{SCHEMA}".')
-    if unknown := sorted(set(edits) - {"schema", "splice"}):
+    if unknown := sorted(set(edits) - {"schema", "splice", "fill"}):
         raise InputError(
             f"{path}: unknown key '{unknown[0]}'; the pins of a splice are in \"splice\": "
             '{"pins": [...]}.'

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from usdhand.display import displayed
 from usdhand.errors import UsdHandError
-from usdhand.formats.dependencies import with_dependencies
 from usdhand.problems import Problem, Severity
 from usdhand.progress import each
-from usdhand.report.document import document, dumps
+from usdhand.report.document import document, dumps, hashed
 from usdhand.report.text import problem_data
 from usdhand.requests.base import Request
 from usdhand.verbs.files import inputs_of
@@ -106,6 +105,7 @@ class Outcome:
     drawn : folder that plots were written to
     problems : everything odd, in the order in which it came
     exit_code : of the command line
+    layers : files that USD inputs are composed of
     failed : whether nothing came of it as a whole, so that the report has no result
     """
 
@@ -120,6 +120,7 @@ class Outcome:
     problems: tuple[Problem, ...] = ()
     exit_code: int = 0
     failed: bool = False
+    layers: tuple[Path, ...] = ()
 
     @cached_property
     def result(self) -> dict[str, Any]:
@@ -136,9 +137,9 @@ class Outcome:
             "problems": [{"file": p.file, **problem_data(p)} for p in self.problems],
         }
         name = FAILURE if self.failed else ""
-        # A file that ended the run is not opened once more.
-        inputs = self.inputs if self.failed else with_dependencies(self.inputs)
-        return document(self.request, inputs, settings, self.result, name) | {"outcome": own}
+        made = document(self.request, self.inputs, settings, self.result, name)
+        layers = {"layers": hashed(self.layers)} if self.layers else {}
+        return made | layers | {"outcome": own}
 
     def to_json(self) -> str:
         """Return the report as text."""

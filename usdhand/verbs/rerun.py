@@ -116,9 +116,14 @@ def _same(a: Path, b: Path) -> bool:
     return a.exists() and b.exists() and a.samefile(b)
 
 
+def _files(report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Entries of the inputs and of the layers that these are composed of."""
+    return [*report["inputs"], *report.get("layers", [])]
+
+
 def _changes(report: Mapping[str, Any]) -> tuple[list[str], list[str]]:
     """Paths of inputs whose content is not what it was, and of those that are not there."""
-    before = {str(entry.get("path")): entry.get("sha256") for entry in report["inputs"]}
+    before = {str(entry.get("path")): entry.get("sha256") for entry in _files(report)}
     now = {path: file_hash(Path(path)) for path in before}
     missing = [path for path in before if before[path] is not None and now[path] is None]
     changed = [path for path in before if before[path] != now[path] and path not in missing]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from usdhand.formats.atomic import written_beside
+from usdhand.formats.dependencies import open_layers_below
 from usdhand.formats.output import check_output
 from usdhand.problems import Problem
 from usdhand.progress import Steps
@@ -50,7 +51,9 @@ def run_verb(request: Request, journal: Journal) -> Outcome:
     Steps(1, journal.progress(request.verb))  # whoever watches may stop any verb
     outcome = verb(request, journal)
     written = tuple(_with_parts(outcome.written))
-    outcome = replace(outcome, written=written, problems=tuple(journal.problems))
+    layers = tuple(open_layers_below(outcome.inputs))
+    problems = tuple(journal.problems)
+    outcome = replace(outcome, written=written, problems=problems, layers=layers)
     if report is not None and outcome.request is request:
         check_output(report, outcome.inputs, force, (".json",))
         with written_beside(report) as temporary:

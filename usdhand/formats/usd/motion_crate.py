@@ -124,16 +124,16 @@ def _is_heavy(layer: Sdf.Layer, spec: Sdf.AttributeSpec) -> bool:
 
 def _prims_above(layer: Sdf.Layer, crate: Sdf.Layer, path: Sdf.Path) -> None:
     """Make a prim and all above it, each among its siblings, whose order is composed as well."""
-    if path == Sdf.Path.absoluteRootPath or crate.GetPrimAtPath(path):
-        return
-    above = path.GetParentPath()
-    _prims_above(layer, crate, above)
-    if path.IsPrimVariantSelectionPath():
-        Sdf.CreatePrimInLayer(crate, path)
-        return
-    parent = layer.pseudoRoot if above == Sdf.Path.absoluteRootPath else layer.GetPrimAtPath(above)
-    for prim in parent.nameChildren:
-        Sdf.CreatePrimInLayer(crate, prim.path)
+    for own in path.GetPrefixes():
+        if crate.GetPrimAtPath(own):
+            continue
+        if own.IsPrimVariantSelectionPath():
+            Sdf.CreatePrimInLayer(crate, own)
+            continue
+        above = own.GetParentPath()
+        root = above == Sdf.Path.absoluteRootPath
+        for prim in (layer.pseudoRoot if root else layer.GetPrimAtPath(above)).nameChildren:
+            Sdf.CreatePrimInLayer(crate, prim.path)
 
 
 def _said(layer: Sdf.Layer) -> Mapping[str, Any]:
