@@ -20,13 +20,14 @@ from usdhand.splice.clocks import clock_notes, clock_pins, clock_warp, is_clocke
 from usdhand.splice.confidence import Doubt, doubts, wanted_pins
 from usdhand.splice.lengths import check_frames, length_notes, part_note, pin_advice, pins_of
 from usdhand.splice.locate import RATE, Place, locate
+from usdhand.splice.long import align_long, long_steps
 from usdhand.splice.markers import Markers, hand_markers
 from usdhand.splice.phases import smoothed
 from usdhand.splice.quality import Phase, phase_qualities
 from usdhand.splice.reach import Contradiction
 from usdhand.splice.refine import MarkerPair
 from usdhand.splice.settings import Pin, SpliceSettings
-from usdhand.splice.timing import HandTiming, align_hands, check_trunks, hands_steps
+from usdhand.splice.timing import HandTiming, check_trunks
 from usdhand.splice.warps import through_pins
 
 # A hand whose wrist stays within this of its mean, in lengths of the palm, does not move; and one
@@ -139,8 +140,6 @@ def aligned_hands(
         body,
         hand_clip,
         pins,
-        settings.band[0],
-        settings.fps,
         lambda: pin_advice(body, hand_clip, place()),
     )
     aligned, more = _timed_hands(body, hand_clip, body_hands, hand_hands, settings, pins, progress)
@@ -292,9 +291,11 @@ def _timings(
     check_trunks(list(markers.values()), settings)
     hands = list(markers)
     runs = dict.fromkeys(pins[s] for s in hands)
-    steps = Steps(sum(hands_steps(len(hands), own) for own in runs), progress)
+    ours, theirs = markers[hands[0]]
+    most = [long_steps(len(hands), ours, theirs, settings, own) for own in runs]
+    steps = Steps(sum(most), progress)
     found = {
-        own: align_hands([markers[s] for s in hands], settings, own, times, steps) for own in runs
+        own: align_long([markers[s] for s in hands], settings, own, times, steps) for own in runs
     }
     steps.add(steps.total - steps.done)  # pins can need less than the most
     return {

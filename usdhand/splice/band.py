@@ -128,6 +128,16 @@ def band_along(first: NDArray[np.int64], last: NDArray[np.int64], band: Band, re
     return Band(low, high)
 
 
+def band_near(band: Band, path: Array, reach: float) -> Band:
+    """The part of a band near a path (rows,) that may leave it; the ends stay where they are."""
+    low = np.clip(np.floor(path - reach).astype(np.int64), band.low[0], band.high[-1])
+    high = np.clip(np.ceil(path + reach).astype(np.int64), band.low[0], band.high[-1])
+    low[0], high[-1] = band.low[0], band.high[-1]
+    low, high = np.maximum(low, band.low), np.minimum(high, band.high)
+    low, high = np.maximum.accumulate(low), np.minimum.accumulate(high[::-1])[::-1]
+    return Band(np.minimum(low, high), high)
+
+
 def _whole_columns(low: Array, high: Array, first: int, last: int) -> Band:
     """Whole columns that a path which never goes back can use."""
     least = np.clip(np.ceil(low - 1e-9), first, last).astype(np.int64)

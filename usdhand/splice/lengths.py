@@ -17,8 +17,6 @@ from usdhand.splice.settings import Pin
 UNLIKELY_FACTOR, MOST_FACTOR = 2.0, 3.3
 # Beside a pin, parts of less seconds than this are where a clip has not begun yet, or has ended.
 LEAST_PART_S = 1.0
-# Beyond this many cells, the way back alone would need a gigabyte.
-MOST_CELLS = 4 * 2**30
 # Tolerance of the pins that are recommended, in seconds.
 ADVISED_TOLERANCE_S = 0.3
 # Tolerance of pins that motion tells.
@@ -44,8 +42,6 @@ def length_notes(
     body: Clip,
     hand_clip: Clip,
     pins: Mapping[Side, Sequence[Pin]],
-    band: float,
-    fps: float,
     advice: Callable[[], str],
 ) -> list[Problem]:
     """Notes on the lengths of the clips between their ends and pins.
@@ -55,12 +51,6 @@ def length_notes(
     UsageError
         if lengths are too different where no pin says that they should be.
     """
-    cells = band * body.duration * hand_clip.duration * fps**2
-    if cells > MOST_CELLS:
-        raise UsageError(
-            f"The body lasts {body.duration:.2f} s, the hand clip {hand_clip.duration:.2f} s: too "
-            "long to align at once. Give a narrower --band."
-        )
     notes: dict[Problem, None] = {}
     for own in pins.values():
         start, end = Pin(0.0, 0.0), Pin(body.duration, hand_clip.duration)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,8 @@ SPARED = 0.6
 DISTINCT, SECOND_BEST, LEAST_SHARED_S = 0.25, 0.6, 0.8
 # It has at least this share of the motion of one of them: a rest is found in many places.
 LEAST_SHARED_MOTION = 0.35
+# Nor is it clear if all of it, with its rests, is shown as many times as fast.
+MOST_STRETCH = 2.2
 # Another place is this many seconds away, at both ends.
 ELSEWHERE_S = 0.75
 # A clip goes on where a wrist moves faster than this share of its RMS speed for as many seconds.
@@ -80,7 +82,7 @@ def locate(pairs: Sequence[MarkerPair]) -> Place | None:
     rate = min(RATE, float(np.sqrt(MOST_CELLS / max(lengths[0] * lengths[1], 1e-9))))
     if rate < LEAST_RATE or min(lengths) * rate < 3:
         return None
-    sides = [[pair[k] for pair in pairs] for k in (0, 1)]
+    sides = [[_without_spikes(pair[k]) for pair in pairs] for k in (0, 1)]
     ours, theirs = (_together([_turnless(m, rate) for m in s]) for s in sides)
     rests = [_rests(s, rate, len(c)) for s, c in zip(sides, (ours, theirs), strict=True)]
     found = _placed((ours, theirs), rests, UNLIKE, rate)
@@ -99,7 +101,8 @@ def locate(pairs: Sequence[MarkerPair]) -> Place | None:
     ]
     most = max(min(inside / max(inside + beyond, 1e-9) for inside, beyond in own) for own in motion)
     shared = found.differs < DISTINCT and shortest >= LEAST_SHARED_S and most >= LEAST_SHARED_MOTION
-    clear = shared and found.second < SECOND_BEST
+    longest = max(body[1] - body[0], hand[1] - hand[0])
+    clear = shared and found.second < SECOND_BEST and longest <= MOST_STRETCH * shortest
     partial = found.spared > SPARED and any(
         beyond > GOES_ON_S for own in motion for _, beyond in own
     )
@@ -209,6 +212,13 @@ def _turned(markers: Markers, rate: float, part: tuple[int, int]) -> Array:
         ACCELERATIONS * acceleration / _rms(acceleration[inside]),
     ]
     return _at_rate(np.concatenate(curves, axis=1), markers, rate)
+
+
+def _without_spikes(markers: Markers) -> Markers:
+    """Markers without what lasts for a single frame, which would count as the usual speed."""
+    from scipy.ndimage import median_filter
+
+    return replace(markers, positions=median_filter(markers.positions, size=(3, 1, 1)))
 
 
 def _rests(hands: Sequence[Markers], rate: float, count: int) -> NDArray[np.bool_]:

@@ -235,7 +235,7 @@ def _shown_alignment(own: Mapping[int, Alignment], shown: NDArray[np.intp]) -> A
         np.stack([times, _chosen({k: a.warp[:, 1] for k, a in own.items()}, shown)], axis=1),
         _chosen({k: a.phase_warp for k, a in own.items()}, shown),
         tuple(p for k, a in own.items() for p in a.pins if take_at(p.body) == k),
-        float(np.mean(_chosen({k: np.full(len(times), a.cost) for k, a in own.items()}, shown))),
+        float(np.mean([own[k].cost for k in shown.tolist()])),
         tuple(
             sorted(
                 (

@@ -10,7 +10,7 @@ import numpy as np
 from usdhand.errors import UsageError
 from usdhand.motion.rotations import Array
 from usdhand.progress import Steps
-from usdhand.splice.band import Band, anchors_of, band_along, pinned_band
+from usdhand.splice.band import Band, anchors_of, band_along, band_near, pinned_band
 from usdhand.splice.confidence import deviation
 from usdhand.splice.markers import Markers
 from usdhand.splice.phases import path_with_steady_turns, phase_path, rematched
@@ -68,12 +68,21 @@ class HandTiming:
     contradictions: tuple[Contradiction, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Guide:
+    """A path (rows,) of which it is known that the one to be found is within ``reach`` columns."""
+
+    path: Array
+    reach: float
+
+
 def align(
     pairs: Sequence[MarkerPair],
     settings: SpliceSettings,
     pins: Sequence[Pin],
     times: Array,
     steps: Steps | None = None,
+    guide: Guide | None = None,
 ) -> tuple[HandTiming, ...]:
     """One timing of all hands, refined for each: markers of body and hand clip of every hand.
 
@@ -86,6 +95,8 @@ def align(
     steps = steps or Steps(STEPS, None)
     body, hand = (_together([p[k] for p in pairs]) for k in (0, 1))
     band = first_band(len(body), len(hand), settings, pins)
+    if guide is not None:
+        band = band_near(band, guide.path, guide.reach)
     rule = settings.rule(settings.smoothing)
     path = phase_path(body, hand, band, rule, settings.align)
     reach = _reach(len(body), settings) * settings.fps
@@ -127,6 +138,7 @@ def align_hands(
     pins: Sequence[Pin],
     times: Array,
     steps: Steps | None = None,
+    guide: Guide | None = None,
 ) -> tuple[HandTiming, ...]:
     """Timings of all hands: one for all, unless one of them agrees better on its own.
 
@@ -134,15 +146,15 @@ def align_hands(
     It takes `hands_steps`.
     """
     steps = steps or Steps(hands_steps(len(pairs), pins), None)
-    free = _suiting(pairs, settings, (), times, steps)
+    free = _suiting(pairs, settings, (), times, steps, guide)
     if not pins:
         return _trusted(pairs, free, settings, times, pins)
     local = [is_local(t.warp, times, pins) for t in free]
     if all(local):
         groups = [pairs] if free[0].shared else [[p] for p in pairs]
-        pinned = [t for group in groups for t in align(group, settings, pins, times, steps)]
+        pinned = [t for group in groups for t in align(group, settings, pins, times, steps, guide)]
     else:
-        pinned = list(_suiting(pairs, settings, pins, times, steps))
+        pinned = list(_suiting(pairs, settings, pins, times, steps, guide))
     free = _trusted(pairs, free, settings, times, ())
     pinned = list(_trusted(pairs, pinned, settings, times, pins))
     for k, (pair, own) in enumerate(zip(pairs, free, strict=True)):
@@ -164,12 +176,13 @@ def _suiting(
     pins: Sequence[Pin],
     times: Array,
     steps: Steps,
+    guide: Guide | None,
 ) -> tuple[HandTiming, ...]:
     """Timings of all hands, one for all where it suits all."""
-    alone = tuple(align([p], settings, pins, times, steps)[0] for p in pairs)
+    alone = tuple(align([p], settings, pins, times, steps, guide)[0] for p in pairs)
     if len(pairs) == 1:
         return alone
-    together = align(pairs, settings, pins, times, steps)
+    together = align(pairs, settings, pins, times, steps, guide)
     both = alone, together
     taken, other = both[::-1] if _in_step(pairs, alone, together, settings) else both
     return tuple(replace(t, other_rows=o.rows) for t, o in zip(taken, other, strict=True))
