@@ -57,8 +57,8 @@ def test_rows_name_the_lane_that_they_tell_of(results: Results, tmp_path: Path) 
     hands = rows_with(results.splice_report, tmp_path, GESTURES / "ok_04.usdc")
     assert {r["lane"] for r in hands} == {"ok_04"}
     moved = [tmp_path / p.name for p in (results.filled, results.fill_report)]
-    for old, new in zip((results.filled, results.fill_report), moved, strict=True):
-        new.write_bytes(old.read_bytes())
+    for old in (results.filled, results.filled.with_suffix(".motion.usdc"), results.fill_report):
+        (tmp_path / old.name).write_bytes(old.read_bytes())
     assert {r["lane"] for r in rows_with(moved[1], tmp_path, moved[0])} == {"filled choice_1"}
 
 

@@ -89,7 +89,8 @@ def _pose_findings(skeleton: Usd.Prim, joints: Sequence[str], where: str) -> Ite
             message = f"{len(matrices)} {name} transforms for {counted(len(joints), 'joint')}"
             yield replace(other_length, message=message)
         elif singular := [joints[int(j)] for j in np.flatnonzero(~_usable(matrices))]:
-            message = f"{name} transforms are singular or not numbers"
+            are = counted(len(singular), f"{name} transform is", f"{name} transforms are")
+            message = f"{are} singular or not numbers"
             yield replace(bad, message=f"{message}: {listed(singular)}")
         else:
             poses[name] = matrices
