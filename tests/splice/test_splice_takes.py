@@ -19,6 +19,7 @@ from pxr import Usd
 from usdhand import find_hands, read_clip
 from usdhand.errors import InputError, UsageError, UsdHandError
 from usdhand.motion import Clip
+from usdhand.report.preview.events import report_rows
 from usdhand.requests.takes import read_manifest
 from usdhand.splice.settings import SpliceSettings
 from usdhand.splice.takes import Take, splice_takes
@@ -142,6 +143,11 @@ def test_takes_of_a_manifest(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     run("preview", str(out), "--with-report", str(report), "-o", str(page))
     assert '"fingers of take 2"' in page.read_text()
+    rows = report_rows(result, report)
+    [seconds] = [r for r in rows if r["side"] == "right" and r["label"] == "seconds of hand clip"]
+    labels = [m["label"] for m in seconds["marks"]]
+    assert labels.count("2") == 3
+    assert [m["time"] for m in seconds["marks"]] == sorted(m["time"] for m in seconds["marks"])
 
 
 @pytest.mark.parametrize(

@@ -35,8 +35,6 @@ ONE_TIMING = 1.15
 # refined: 0 to 5 ms where hands are in step, since they are held; 7 to 30 ms where they are 80 ms
 # out of it.
 MOST_LAG_S = 0.006
-# Where they hardly do, a hand whose own timing is wrong may differ by more with the shared one.
-IN_STEP_LAG_S, IN_STEP = 0.003, 1.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,8 +227,7 @@ def _in_step(
         weight = evidence(*pair, one.shared_rows, settings.align).information
         moved = np.sum(weight * (one.rows - one.shared_rows)) / max(np.sum(weight), 1e-9)
         lags.append(moved / pair[1].fps)
-    lag = max(lags) - min(lags)
-    return bool(max(worse) < (IN_STEP if lag < IN_STEP_LAG_S else ONE_TIMING) and lag < MOST_LAG_S)
+    return bool(max(worse) < ONE_TIMING and max(lags) - min(lags) < MOST_LAG_S)
 
 
 def first_band(rows: int, columns: int, settings: SpliceSettings, pins: Sequence[Pin]) -> Band:

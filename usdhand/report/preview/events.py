@@ -207,9 +207,15 @@ def _splice_rows(side: str, hand: Mapping[str, Any]) -> list[dict[str, Any]]:
             "side": side,
             "label": "seconds of hand clip",
             "spans": [],
-            "marks": _second_marks(warp[:, 0], warp[:, 1]),
+            "marks": [mark for part in _takes_of(warp, hand) for mark in _second_marks(*part.T)],
         },
     ]
+
+
+def _takes_of(warp: Array, hand: Mapping[str, Any]) -> list[Array]:
+    """A warp (n, 2) split where another take begins, in each of which time goes on."""
+    begins = [float(p["start"]) for p in hand.get("pieces", [])[1:]]
+    return np.split(warp, np.searchsorted(warp[:, 0], np.array(begins) - 1e-6))
 
 
 def _second_marks(body: Array, hand: Array) -> list[dict[str, Any]]:
