@@ -33,6 +33,7 @@ def times_full(*arguments: object) -> int:
     return int(done.stdout.split()[-1])
 
 
+@pytest.mark.slow
 def test_some_sizes_leave_old_files_or_new_ones() -> None:
     assert times_full(2) > 20
 
