@@ -263,6 +263,7 @@ def told_to_end() -> None:
     os.kill(os.getpid(), 15)
 
 
+@pytest.mark.slow  # alone (-n 0): a fork beside threads of USD may wait for ever
 @pytest.mark.skipif(os.name != "posix", reason="this system has no fork")
 @pytest.mark.parametrize("how", [killed, full, told_to_end])
 @pytest.mark.parametrize("was_there", [True, False])
