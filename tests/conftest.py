@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("USDHAND_SHARED", REPOSITORY.parent / "shared"))
-pytest_plugins = ["builders.browser"]
+pytest_plugins = ["builders.browser", "builders.made"]
 LEFT_OUT = pytest.StashKey[Counter[str]]()
 
 # The same examples in every run: a failure can be made again. Machines differ in speed.

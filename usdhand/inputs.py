@@ -28,6 +28,15 @@ def why_no_file(path: str | Path) -> str:
     return "" if stat.S_ISREG(mode) else "it is neither a file nor a folder"
 
 
+def is_text(name: str) -> bool:
+    """Whether a name can be written as UTF-8: bytes that are none, and half a character, cannot."""
+    try:
+        name.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def read_text(path: Path, most: int = MOST_TEXT) -> str:
     """Read a whole text file.
 

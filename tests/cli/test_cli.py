@@ -5,38 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import cli_runner
-from click.testing import Result
-from conftest import REPOSITORY
+from builders.made import BEN, OK, SAMPLES, Run
 from pxr import Sdf, Usd
-
-SAMPLES = REPOSITORY / "samples"
-
-
-OK = SAMPLES / "gestures" / "ok_01.usdc"
-
-
-BEN = SAMPLES / "characters" / "ben.usdc"
-
-
-Run = Callable[..., Result]
-
-
-@pytest.fixture
-def run() -> Run:
-    return cli_runner.run
-
-
-@pytest.fixture
-def rig(run: Run, tmp_path: Path) -> Path:
-    path = tmp_path / "ok_rig.usda"
-    run("reduce", OK, "-o", path)
-    return path
 
 
 def test_reduce_tells_what_users_ask_for(run: Run, tmp_path: Path) -> None:

@@ -10,39 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.cli_runner import run
-from conftest import REPOSITORY, shared_data
+from builders.made import BODY, FULL, SAMPLES
+from conftest import shared_data
 from pxr import Usd, UsdSkel
 
 import usdhand
 from usdhand.evaluate.reconstruction import HandError
-from usdhand.fill.library import MotionLibrary
 from usdhand.fill.settings import PAPER, FillSettings
 from usdhand.formats.usd.library import read_library, write_library
-from usdhand.motion import Clip
 from usdhand.motion.rotations import Array
 from usdhand.verbs.evaluate import measure_library
 from usdhand.verbs.library import build_library
 
 OPEN: list[Usd.Stage] = []  # prims live as long as their stage
-
-
-SAMPLES = REPOSITORY / "samples"
-
-
-BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
-
-
-FULL = SAMPLES / "conversations" / "talk_01_full.usdc"
-
-
-@pytest.fixture(scope="session")
-def library(gestures_library: Path) -> MotionLibrary:
-    return read_library(gestures_library)
-
-
-@pytest.fixture(scope="session")
-def body() -> Clip:
-    return usdhand.read_clip(BODY)
 
 
 def animation(path: Path) -> UsdSkel.Animation:

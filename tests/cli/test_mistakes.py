@@ -9,34 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import cli_runner
 from builders.cli_runner import edit
-from click.testing import Result
-from conftest import REPOSITORY
+from builders.made import BEN, OK, SAMPLES, Run
 from pxr import Sdf, Usd, UsdSkel, Vt
-
-SAMPLES = REPOSITORY / "samples"
-
-
-OK = SAMPLES / "gestures" / "ok_01.usdc"
-
-
-BEN = SAMPLES / "characters" / "ben.usdc"
-
-
-Run = Callable[..., Result]
-
-
-@pytest.fixture
-def run() -> Run:
-    return cli_runner.run
-
-
-@pytest.fixture
-def rig(run: Run, tmp_path: Path) -> Path:
-    path = tmp_path / "ok_rig.usda"
-    run("reduce", OK, "-o", path)
-    return path
 
 
 def bad_clip(name: str, folder: Path) -> Path:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from builders.cli_runner import run
 from builders.clips import frames_of
-from conftest import REPOSITORY
+from builders.made import BODY, FULL, SAMPLES
 from pxr import Sdf, Usd
 
 import usdhand
@@ -21,30 +21,12 @@ from usdhand.errors import InputError, UsageError
 from usdhand.fill.library import MotionLibrary
 from usdhand.fill.limits import channel_limits
 from usdhand.fill.settings import PAPER, FillSettings
-from usdhand.formats.usd.library import read_library, write_library
+from usdhand.formats.usd.library import write_library
 from usdhand.motion import Clip
 from usdhand.motion.resample import resample
 from usdhand.verbs.evaluate import measure_library
 from usdhand.verbs.fill import fill_fingers
 from usdhand.verbs.library import build_library
-
-SAMPLES = REPOSITORY / "samples"
-
-
-BODY = SAMPLES / "conversations" / "talk_01_body.usdc"
-
-
-FULL = SAMPLES / "conversations" / "talk_01_full.usdc"
-
-
-@pytest.fixture(scope="session")
-def library(gestures_library: Path) -> MotionLibrary:
-    return read_library(gestures_library)
-
-
-@pytest.fixture(scope="session")
-def body() -> Clip:
-    return usdhand.read_clip(BODY)
 
 
 def part_of(clip: Clip, frames: slice, fps: float | None = None) -> Clip:

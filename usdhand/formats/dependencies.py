@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from usdhand.formats.suffixes import USD_SUFFIXES
+from usdhand.inputs import is_text
 
 
 def open_layers_below(paths: Iterable[Path]) -> list[Path]:
@@ -15,7 +16,11 @@ def open_layers_below(paths: Iterable[Path]) -> list[Path]:
 
     Nothing is opened for it. Relative to the current folder where the file is.
     """
-    usd = [path for path in paths if path.suffix.lower() in USD_SUFFIXES and _is_text(path)]
+    usd = [
+        path
+        for path in paths
+        if path.suffix.lower() in USD_SUFFIXES and is_text(str(path.absolute()))
+    ]
     if "pxr.Sdf" not in sys.modules or not usd:
         return []
     from pxr import Sdf
@@ -35,12 +40,3 @@ def open_layers_below(paths: Iterable[Path]) -> list[Path]:
                     own = Path(below.realPath)
                     found[own if path.is_absolute() else Path(os.path.relpath(own))] = None
     return sorted(found)
-
-
-def _is_text(path: Path) -> bool:
-    """Whether USD can have a file of this name open at all."""
-    try:
-        str(path).encode("utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usdhand.errors import InputError, UsageError
+from usdhand.inputs import is_text
 from usdhand.motion import rotations as rot
 from usdhand.motion.rotations import UNIT_TOLERANCE, Array
 from usdhand.motion.skeleton import Skeleton, leaf_name, parents_from_paths
@@ -250,18 +251,9 @@ def _names(joints: Sequence[str]) -> list[str]:
     for number, name in enumerate(names):
         if not name or not leaf_name(name):
             raise UsageError(f"joints: number {number} has no name ({name!r}).")
-        if not _is_text(name):
+        if not is_text(name):
             raise UsageError(f"joints: the name of number {number} is no text ({name!r}).")
     return names
-
-
-def _is_text(name: str) -> bool:
-    """Whether every program can read a name: half a character of UTF-16 is none."""
-    try:
-        name.encode("utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _tree(names: list[str], parents: ArrayLike | None) -> tuple[tuple[str, ...], NDArray[np.intp]]:

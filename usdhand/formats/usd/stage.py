@@ -15,7 +15,7 @@ from usdhand.errors import InputError, UsageError
 from usdhand.formats.suffixes import USD_SUFFIXES
 from usdhand.formats.usd.damage import first_line, refuses_damage, sentence, usd_diagnostics
 from usdhand.formats.usd.motion_crate import motion_of, other_motion
-from usdhand.inputs import why_no_file
+from usdhand.inputs import is_text, why_no_file
 from usdhand.problems import CHOICES, Problem, listed
 from usdhand.witness import opening
 
@@ -102,7 +102,7 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
     InputError
         if there is no such file, or USD cannot read it.
     """
-    if not is_text(path):
+    if not is_text(str(path.absolute())):
         raise InputError(f"{readable(path)}: this name is not valid UTF-8, which USD needs.")
     if why := why_no_file(path):
         raise InputError(f"{path}: {why}.")
@@ -130,15 +130,6 @@ def open_stage(path: Path) -> tuple[Usd.Stage, tuple[Problem, ...]]:
         message = f"{crate} is not as it was written with this file: the motion may be another one"
         problems.append(Problem("other-motion", message))
     return stage, tuple(problems)
-
-
-def is_text(path: Path) -> bool:
-    """Whether a path can be handed to USD: its bytes are UTF-8."""
-    try:
-        str(path.absolute()).encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def readable(path: Path) -> str:

@@ -28,7 +28,6 @@ from usdhand.formats.usd.saving import export, reload, save, verify
 from usdhand.formats.usd.stage import (
     Character,
     compose,
-    is_text,
     readable,
 )
 from usdhand.formats.usd.textures import (
@@ -42,6 +41,7 @@ from usdhand.formats.usd.textures import (
     unpacked_beside,
     without_times,
 )
+from usdhand.inputs import is_text
 from usdhand.motion import Clip
 from usdhand.motion.plausible import check_clip
 from usdhand.motion.timing import SAME_CODE
@@ -201,7 +201,7 @@ def check_name(output: Path) -> None:
     OutputError
         if its bytes are no UTF-8.
     """
-    if not is_text(output):
+    if not is_text(str(output.absolute())):
         raise OutputError(f"{readable(output)}: this name is not valid UTF-8, which USD needs.")
 
 
